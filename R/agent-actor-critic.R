@@ -1,23 +1,22 @@
 #' Actor-critic, step by step
 #'
-#' Learns a policy and the values of states beside each other. The actor's preferences, of which a
-#' softmax makes the probabilities of the actions, are moved towards an action that came to more
-#' than the critic had expected, and away from one that came to less (Barto, Sutton and Anderson
-#' 1983; Sutton and Barto 2018, section 13.5). Both have eligibility traces, which are accumulating,
-#' and which `lambda = 0` turns off.
+#' Learn a policy (the actor) and the values of states (the critic) together. A softmax turns the
+#' actor's preferences into the probabilities of the actions. A preference rises if its action led
+#' to more than the critic expected, and falls if it led to less (Barto, Sutton and Anderson 1983;
+#' Sutton and Barto 2018, section 13.5). Both have accumulating eligibility traces. `lambda = 0`
+#' turns them off.
 #'
 #' @inheritParams agent_sarsa
 #' @param learning_rate How far a value of the critic moves towards its target, a number from 0 to 1
-#'   or a function of the steps so far; the default is 0.1.
-#' @param actor_rate How far preferences move, in the same way; the default is 0.1.
+#'   or a function of the steps so far. The default is 0.1.
+#' @param actor_rate How far preferences move, given in the same way. The default is 0.1.
 #' @param lambda,actor_lambda How slowly the traces of the critic and of the actor fade, numbers
-#'   from 0, the default, to 1.
-#' @param initial The value that all states have at first, a number; the default is 0. Preferences
-#'   are 0 at first.
-#' @return `agent_actor_critic()` an agent of class `gym_agent_actor_critic`;
-#'   `learn_actor_critic()` makes that agent, trains it and returns what [train_agent()] does. Its
-#'   `$policy` draws each action with the probability that it has learned, and [state_values()]
-#'   gives the values of the states.
+#'   from 0 (the default) to 1.
+#' @param initial The first value of all states, a number. The default is 0. Preferences start at 0.
+#' @return `agent_actor_critic()` returns an agent of class `gym_agent_actor_critic`.
+#'   `learn_actor_critic()` makes this agent, trains it and returns the result of [train_agent()].
+#'   Its `$policy` draws each action with the learned probability, and [state_values()] returns the
+#'   values of the states.
 #' @inheritSection agent_q Errors
 #' @references A. G. Barto, R. S. Sutton and C. W. Anderson (1983), Neuronlike adaptive elements
 #'   that can solve difficult learning control problems, IEEE Transactions on Systems, Man, and
@@ -46,7 +45,7 @@ agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate 
   new_learner("gym_agent_actor_critic", settings)
 }
 
-# The weights are those of the critic, and the preferences the actor's.
+# The weights are the critic's; the actor's are the preferences.
 #' @exportS3Method
 value_columns_of.gym_agent_actor_critic <- function(agent) 1L
 

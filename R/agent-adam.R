@@ -1,11 +1,11 @@
-# Adam (Kingma and Ba 2015, Algorithm 1), and the clipping of gradients.
+# Adam (Kingma and Ba 2015, Algorithm 1), and gradient clipping.
 
 new_adam <- function(count) list(mean = numeric(count), square = numeric(count), steps = 0)
 
 #' Take a step down a gradient
 #' @param weights,gradient Vectors of the same length.
-#' @param adam The moments so far, as new_adam() makes them and this function returns them.
-#' @param epsilon Keeps what is divided by from 0.
+#' @param adam The moments so far, as returned by new_adam() or by this function.
+#' @param epsilon Keeps the divisor away from 0.
 #' @return A list: `weights` and `adam`.
 #' @noRd
 adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
@@ -20,7 +20,7 @@ adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
   )
 }
 
-# Makes a gradient that is longer than `longest` as long as that.
+# Shortens a gradient to the length `longest` if it is longer.
 clip_norm <- function(gradient, longest) {
   norm <- sqrt(sum(gradient * gradient))
   if (isTRUE(norm > longest)) gradient * (longest / (norm + 1e-6)) else gradient

@@ -1,9 +1,9 @@
-# Returns and advantages of whole episodes, whose steps follow one another.
+# Returns and advantages of whole episodes, whose steps are in order.
 
-#' Sum what comes after each step, backwards
-#' @param values What a step adds.
-#' @param decay What the sum is multiplied by for each step.
-#' @param last Whether a step is the last of its episode; by default all are of one.
+#' Sum the values from each step to the end of its episode
+#' @param values The value of each step.
+#' @param decay The discount per step.
+#' @param last Whether a step is the last of its episode. By default all steps are of one episode.
 #' @noRd
 sum_backwards <- function(values, decay, last = seq_along(values) == length(values)) {
   sum <- 0
@@ -14,10 +14,10 @@ sum_backwards <- function(values, decay, last = seq_along(values) == length(valu
   values
 }
 
-# Whether each step is the last of its episode, by the episodes' numbers.
+# Whether each step is the last of its episode, given the episodes' numbers.
 ends_of <- function(episode) c(episode[-1L] != episode[-length(episode)], TRUE)
 
-# The value of the state after each step: 0 where the episode terminated. One that was truncated
+# The value of the state after each step. It is 0 if the episode terminated. A truncated episode
 # would have gone on, so its last state keeps its value.
 next_values <- function(value, last_value, terminated, last) {
   after <- c(value[-1L], 0)
@@ -33,8 +33,8 @@ estimate_advantages <- function(reward, value, after, last, gamma, lambda) {
   sum_backwards(reward + gamma * after - value, gamma * lambda, last)
 }
 
-# Rewards divided by the standard deviation of the discounted return so far, and cut at 10 of them.
-# Returns a list: `reward`, and `moments` of that return.
+# Divides rewards by the standard deviation of the discounted return so far and clips them at 10.
+# Returns a list: `reward`, and the `moments` of that return.
 scale_rewards <- function(reward, last, gamma, moments) {
   so_far <- reward
   for (t in seq_along(reward)[-1L]) {

@@ -1,14 +1,14 @@
 #' Augmented random search
 #'
-#' Steps along random directions, each weighted by how much better one does when one goes along it
-#' than when one goes against it (Mania, Guy and Recht 2018, Algorithm 2). In each iteration
-#' `directions` are drawn from the standard normal distribution, and the policies with `noise` times
-#' the direction added to, and subtracted from, the weights are played. Of the `top` directions with
-#' the best of the two returns the step is made up: `step_size` times the sum of (return along -
-#' return against) times direction, divided by `top` and by the standard deviation of the returns
-#' used (the one that divides by their number).
+#' Take steps along random directions, weighted by how much better the policy is in the direction
+#' than against it (Mania, Guy and Recht 2018, Algorithm 2). Each iteration draws `directions`
+#' directions from the standard normal distribution. It plays the policies whose weights are the
+#' current ones plus and minus `noise` times each direction. It ranks directions by the better of
+#' their two returns and keeps the `top` best. The step is `step_size` times the sum of (return with
+#' plus - return with minus) times direction, divided by `top` and by the standard deviation of the
+#' returns used (the one that divides by their number).
 #'
-#' The versions are those of the paper:
+#' The versions are the paper's:
 #'
 #' | version | observations | directions used |
 #' |---|---|---|
@@ -17,36 +17,36 @@
 #' | V2 | normalised | all |
 #' | V2-t | normalised | the `top` ones |
 #'
-#' (A policy that was made with `normalize = TRUE` normalises them in V1, too.)
+#' A policy made with `normalize = TRUE` normalises observations in V1, too.
 #'
-#' As in the authors' code there is no step where the returns used are all the same, and a number of
-#' an observation that has not changed comes in as 0; unlike there, of directions with equal returns
-#' the first are used, and not all.
+#' As in the authors' code, there is no step if all returns used are equal, and an element of an
+#' observation that has not changed becomes 0. The authors' code keeps all directions with equal
+#' returns; this function keeps the first ones.
 #'
-#' @param directions How many directions are drawn, a whole number of at least 1. Twice as many
-#'   candidates are played in an iteration.
-#' @param top How many of them make up the step, a whole number from 1 to `directions`; the default
-#'   is half of them.
-#' @param step_size How far the steps go, a number above 0.
-#' @param noise How far from the weights the candidates are, a number above 0.
-#' @param version The version, one of `"V1"`, `"V1-t"`, `"V2"` and `"V2-t"`, the default.
-#' @param shift What is subtracted from the reward of each step in training, a number: where an
-#'   environment rewards mere survival, as Hopper does by 1, the paper takes that away. The default
-#'   is 0.
-#' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
-#'   a row for, the settings that are not given are taken from there, with a message.
-#' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]; `NULL`,
-#'   the default, takes the preset's budget, and the environment's target.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
-#'   environment's own, such as `continuous = TRUE` for LunarLander.
-#' @return `agent_ars()` an agent of class `gym_agent_ars`; `search_ars()` makes that agent, trains
+#' @param directions The number of directions per iteration, a whole number of at least 1. An
+#'   iteration plays twice as many candidates.
+#' @param top How many of the directions make up the step, a whole number from 1 to `directions`.
+#'   The default is half of them.
+#' @param step_size The step size, a number above 0.
+#' @param noise The distance of candidates from the weights, a number above 0.
+#' @param version One of `"V1"`, `"V1-t"`, `"V2"` and `"V2-t"` (the default).
+#' @param shift A number that training subtracts from the reward of each step. The paper uses it for
+#'   environments that reward survival, such as Hopper, which pays 1 per step. The default is 0.
+#' @param env The environment, as for [train_agent()]. If it is an id with a row in
+#'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or [policy_linear()].
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. `NULL`,
+#'   the default, uses the preset's budget and the environment's target.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
+#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_ars()` returns an agent of class `gym_agent_ars`. `search_ars()` makes this agent,
+#'   trains it and returns the result of [train_agent()].
 #'   it and returns what [train_agent()] does.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be.
+#' @section Errors: `gym_error_argument` for an invalid argument.
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31. Code:
 #'   <https://github.com/modestyachts/ARS>.
-#' @seealso [agent_cem()], [agent_hill_climb()]; [agent_ask()] for what an agent is.
+#' @seealso [agent_cem()], [agent_hill_climb()]; [agent_ask()] explains what an agent is.
 #' @export
 #' @examples
 #' agent_ars()
@@ -103,7 +103,7 @@ agent_ask.gym_agent_ars <- function(agent) {
   weights <- stats::coef(agent$policy)
   count <- length(weights)
   directions <- matrix(stats::rnorm(agent$directions * count), agent$directions, count)
-  # Along and against the first direction, along and against the second, and so on.
+  # In the order: plus and minus the first direction, plus and minus the second, and so on.
   away <- directions[rep(seq_len(agent$directions), each = 2L), , drop = FALSE] *
     c(agent$noise, -agent$noise)
   structure(rep(weights, each = 2L * agent$directions) + away, directions = directions)

@@ -1,40 +1,42 @@
 #' Learn in a bandit
 #'
-#' Lets many learners play a bandit, each one with arms of its own, and shows how their rewards grow
-#' in the mean: the ten-armed testbed of Sutton and Barto (2018, section 2.3). The learners know
-#' nothing of each other; that they play side by side only makes it quick.
+#' Let many learners play a bandit, each with its own arms, and record the mean of their rewards per
+#' step. This is the ten-armed testbed of Sutton and Barto (2018, section 2.3). The learners are
+#' independent. They play together only because that is faster.
 #'
 #' | `method` | which arm it takes | section |
 #' |---|---|---|
-#' | `"epsilon_greedy"` | the one with the largest mean reward so far, and with probability
-#' `epsilon` any | 2.2 |
-#' | `"ucb"` | the one with the largest upper confidence bound, the mean plus `confidence` times
-#' `sqrt(log(t) / n)` after n of t steps; first each once | 2.7 |
-#' | `"gradient"` | one drawn by a softmax of preferences, which rise with rewards above the mean |
-#' 2.8 |
+#' | `"epsilon_greedy"` | the largest mean reward so far; any with probability `epsilon` | 2.2 |
+#' | `"ucb"` | the largest upper confidence bound | 2.7 |
+#' | `"gradient"` | drawn by a softmax of preferences | 2.8 |
 #'
-#' Of equal arms one is drawn.
+#' The upper confidence bound of an arm that was taken `n` times in `t` steps is its mean reward
+#' plus `confidence` times `sqrt(log(t) / n)`. Each arm is taken once first. Preferences rise with
+#' rewards above the mean.
 #'
-#' @param env What [bandit()] makes.
+#' Ties are broken at random.
+#'
+#' @param env A bandit made by [bandit()].
 #' @param method The method, a string.
-#' @param epsilon How often it explores, a number from 0 to 1; the default is 0.1.
-#' @param confidence How much an arm that was seldom taken is favoured by `"ucb"`, a number of at
-#'   least 0; the default is 2.
-#' @param learning_rate How far a value, or a preference, moves towards its target, a number above
-#'   0; `NULL`, the default, takes the mean of all rewards, and 0.1 for `"gradient"`.
-#' @param initial The value that all arms have at first, a number; the default is 0. With a constant
-#'   `learning_rate` a large one makes it try all arms (section 2.6).
-#' @param baseline Does `"gradient"` compare rewards with their mean so far? `TRUE`, the default, or
-#'   `FALSE`, with 0.
-#' @param learners How many learners there are, a whole number of at least 1; the default is 2,000.
-#' @param horizon How many steps they take, a whole number; `NULL`, the default, is an episode of
-#'   the bandit's.
-#' @param seed A whole number that fixes all that is drawn, as for [rollout()].
-#' @return An object of class `gym_bandit_learning`, which [print()], [as.data.frame()] and
-#'   [plot()][plot.gym_bandit_learning()] know; a list with the elements `curve`, a data frame of
-#'   `step` (integer), `mean_reward` (the mean over the learners) and `best_share` (how many of them
-#'   took an arm with the largest mean reward, from 0 to 1); `values`, a matrix with a row for each
-#'   learner and a column for each arm, its values or preferences at the end; and `label`,
+#' @param epsilon The probability of exploring, a number from 0 to 1. The default is 0.1.
+#' @param confidence How much `"ucb"` favours arms that were seldom taken, a number of at least 0.
+#'   The default is 2.
+#' @param learning_rate How far a value or a preference moves towards its target, a number above 0.
+#'   `NULL`, the default, uses the mean of all rewards, and 0.1 for `"gradient"`.
+#' @param initial The first value of all arms, a number. The default is 0. With a constant
+#'   `learning_rate`, a large value makes the learner try all arms (section 2.6).
+#' @param baseline What does `"gradient"` compare rewards with? `TRUE`, the default, for the mean
+#'   reward so far, `FALSE` for 0.
+#' @param learners The number of learners, a whole number of at least 1. The default is 2,000.
+#' @param horizon The number of steps, a whole number. `NULL`, the default, plays one episode of the
+#'   bandit.
+#' @param seed A whole number that fixes all random numbers, as for [rollout()].
+#' @return An object of class `gym_bandit_learning`, with methods for [print()], [as.data.frame()]
+#'   and [plot()][plot.gym_bandit_learning()]. It is a list with the elements `curve`, a data frame
+#'   of `step` (integer), `mean_reward` (the mean over the learners) and `best_share` (the share of
+#'   learners that took an arm with the largest mean reward, from 0 to 1); `values`, a matrix with a
+#'   row for each learner and a column for each arm, holding the final values or preferences; and
+#'   `label`, `learners` and `seed`.
 #'   `learners` and `seed`.
 #' @section Errors: `gym_error_argument`.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second

@@ -1,35 +1,34 @@
 #' The cross-entropy method
 #'
-#' Draws the candidates of an iteration from a normal distribution of the weights, each weight by
-#' itself, and takes the mean and the standard deviation of the best of them, the elite, for the
-#' next iteration (Szita and Lorincz 2006). To the variance from which candidates are drawn that of
-#' an extra noise is added, which decreases to 0: without it the distribution soon becomes so narrow
-#' that the search sticks.
+#' Draw the candidates of an iteration from a normal distribution of the weights, in which weights
+#' are independent. The mean and standard deviation of the best candidates, the elite, become those
+#' of the next iteration (Szita and Lorincz 2006). An extra noise, which decreases to 0, is added to
+#' the variance. Without it the distribution soon becomes so narrow that the search gets stuck.
 #'
-#' The agent's policy has the mean of the distribution as its weights. The first mean are the
-#' weights that the policy has when training begins.
+#' The weights of the agent's policy are the mean of the distribution. The first mean is the weights
+#' that the policy has when training begins.
 #'
-#' @param population How many candidates are played in an iteration, a whole number of at least 2.
-#' @param elite How many of them are the elite, a whole number from 1 to `population`; the default
+#' @param population The number of candidates per iteration, a whole number of at least 2.
+#' @param elite How many of them are the elite, a whole number from 1 to `population`. The default
 #'   is a fifth of them.
 #' @param noise The standard deviation of the first distribution, a number above 0.
 #' @param extra_noise The standard deviation of the extra noise in the first iteration, a number of
 #'   at least 0.
-#' @param extra_iterations After how many iterations the extra noise has become 0, a whole number of
-#'   at least 1; its variance decreases by the same amount in each.
-#' @param env The environment, as for [train_agent()]. Where it is an id that [agent_presets()] has
-#'   a row for, the settings that are not given are taken from there, with a message.
-#' @param policy The policy; `NULL`, the default, is the preset's, or [policy_linear()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]; `NULL`,
-#'   the default, takes the preset's budget, and the environment's target.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
-#'   environment's own, such as `continuous = TRUE` for LunarLander.
-#' @return `agent_cem()` an agent of class `gym_agent_cem`; `search_cem()` makes that agent, trains
-#'   it and returns what [train_agent()] does.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be.
+#' @param extra_iterations The number of iterations after which the extra noise is 0, a whole number
+#'   of at least 1. Its variance decreases by the same amount in each.
+#' @param env The environment, as for [train_agent()]. If it is an id with a row in
+#'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or [policy_linear()].
+#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. `NULL`,
+#'   the default, uses the preset's budget and the environment's target.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
+#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_cem()` returns an agent of class `gym_agent_cem`. `search_cem()` makes this agent,
+#'   trains it and returns the result of [train_agent()].
+#' @section Errors: `gym_error_argument` for an invalid argument.
 #' @references I. Szita and A. Lorincz (2006), Learning Tetris using the noisy cross-entropy method,
 #'   Neural Computation 18(12), 2936-2941.
-#' @seealso [agent_ars()], [agent_hill_climb()]; [agent_ask()] for what an agent is.
+#' @seealso [agent_ars()], [agent_hill_climb()]; [agent_ask()] explains what an agent is.
 #' @export
 #' @examples
 #' agent_cem()

@@ -1,51 +1,54 @@
 #' Deep Q-networks
 #'
-#' Learns the value of each action by a network (Mnih et al. 2015): plays epsilon-greedily, keeps
-#' every step in a memory, and from minibatches that are drawn from it moves the values towards the
-#' reward plus the discounted value of the best next action. That value is given by a target
-#' network, an older copy; with `double = TRUE` the action is the network's own choice (van Hasselt,
-#' Guez and Silver 2016).
+#' Learn the value of each action with a network (Mnih et al. 2015). The agent plays
+#' epsilon-greedily and keeps every step in a memory. It draws minibatches from the memory and moves
+#' the values towards the reward plus the discounted value of the best next action. A target
+#' network, an older copy, supplies that value. With `double = TRUE` the network itself chooses the
+#' action (van Hasselt, Guez and Silver 2016).
 #'
-#' The policy is a [policy_network()] with the output `"epsilon-greedy"`, by default with two hidden
-#' layers of 64 ReLU neurons. Its `epsilon` is the agent's. The loss is Huber's, its gradient, not
-#' longer than `max_grad_norm`, goes into Adam (Kingma and Ba 2015).
+#' The policy is a [policy_network()] with the output `"epsilon-greedy"` and, by default, two hidden
+#' layers of 64 ReLU neurons. Its `epsilon` is the agent's. The loss is Huber's. Its gradient is
+#' clipped to `max_grad_norm` and passed to Adam (Kingma and Ba 2015).
 #'
-#' An iteration is whole episodes, by default one or two. They are played with one `epsilon` and the
-#' same weights; then come as many updates as `updates_per_step` times its steps, where a remainder
-#' is carried to the next iteration. An episode that was truncated would have gone on, so the value
-#' of its last state counts; after one that was terminated nothing is to come. With a policy that
-#' has `normalize = TRUE` the first iteration is random episodes, as of [agent_ppo()].
+#' An iteration plays whole episodes, by default one or two, with the same `epsilon` and the same
+#' weights. Then it makes `updates_per_step` updates per step; a remainder is carried over to the
+#' next iteration. A truncated episode would have gone on, so the value of its last state counts.
+#' After a terminated one there is nothing to come. If the policy has `normalize = TRUE`, the first
+#' iteration plays random episodes, as in [agent_ppo()].
 #'
 #' A checkpoint keeps the memory in files beside its own, such as `training.rds.memory-0` for
-#' `training.rds`, to which only what is new is appended.
+#' `training.rds`. Only new steps are appended to them.
 #'
-#' @param memory How many steps the memory has at most, a whole number; the oldest are forgotten.
-#'   The default is 50,000.
-#' @param learning_starts After how many steps learning begins, a whole number; the default is 1000.
-#' @param batch How many steps a minibatch has, a whole number; the default is 64.
-#' @param updates_per_step How many minibatches are learned from for each step, a number above 0;
-#'   the default is 0.5.
-#' @param learning_rate The step size of Adam, a number above 0, or a function of the steps so far;
-#'   the default is 1e-3.
-#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
-#' @param epsilon How often any action is drawn, a number from 0 to 1, or a function of the steps so
-#'   far; the default goes from 1 to 0.05 in 10,000 steps.
+#' @param memory The largest number of steps in the memory, a whole number. The oldest are
+#'   forgotten. The default is 50,000.
+#' @param learning_starts The number of steps before learning begins, a whole number. The default
+#'   is 1000.
+#' @param batch The number of steps in a minibatch, a whole number. The default is 64.
+#' @param updates_per_step The number of minibatches per step, a number above 0. The default is 0.5.
+#' @param learning_rate The step size of Adam, a number above 0, or a function of the steps so far.
+#'   The default is 1e-3.
+#' @param gamma The discount, a number from 0 to 1. The default is 0.99.
+#' @param epsilon The probability of a random action, a number from 0 to 1, or a function of the
+#'   steps so far. The default goes from 1 to 0.05 in 10,000 steps.
 #' @param double Does the network choose the action that the target network values? `TRUE`, the
 #'   default, or `FALSE` as in Mnih et al. (2015).
-#' @param target_every After how many steps the target network becomes a copy of the network, a
-#'   whole number; the default is 500. The updates of an iteration count as if they were spread
-#'   evenly over its steps.
-#' @param target_rate `NULL`, the default, or a number from 0 to 1: then the target network comes
-#'   nearer by this part in each update, and `target_every` does not count.
-#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`; the default is 10.
-#' @param batch_steps About how many steps an iteration has, a whole number; the default is 1.
-#' @param min_episodes The least number of episodes of an iteration; the default is 1.
+#' @param target_every The number of steps after which the target network becomes a copy of the
+#'   network, a whole number. The default is 500. The updates of an iteration count as if they were
+#'   spread evenly over its steps.
+#' @param target_rate `NULL`, the default, or a number from 0 to 1. The target network then moves by
+#'   this share towards the network in each update, and `target_every` is ignored.
+#' @param max_grad_norm The largest length of a gradient, a number or `Inf`. The default is 10.
+#' @param batch_steps The approximate number of steps in an iteration, a whole number. The default
+#'   is 1.
+#' @param min_episodes The smallest number of episodes in an iteration. The default is 1.
 #' @inheritParams agent_ars
-#' @param policy The policy; `NULL`, the default, is the preset's, or the one told above.
-#' @return `agent_dqn()` an agent of class `gym_agent_dqn`; `learn_dqn()` makes that agent, trains
-#'   it and returns what [train_agent()] does. Its history, and the log, have for each iteration
-#'   `loss`, `n_updates`, `exploration_rate` and `learning_rate`.
-#' @section Errors: As [agent_ppo()]; also for an environment whose actions are no Discrete space.
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described
+#'   above.
+#' @return `agent_dqn()` returns an agent of class `gym_agent_dqn`. `learn_dqn()` makes this agent,
+#'   trains it and returns the result of [train_agent()]. For each iteration its history and the log
+#'   have `loss`, `n_updates`, `exploration_rate` and `learning_rate`.
+#' @section Errors: As for [agent_ppo()], and `gym_error_argument` for actions that are not
+#'   Discrete.
 #' @references V. Mnih et al. (2015), Human-level control through deep reinforcement learning,
 #'   Nature 518.
 #'
@@ -116,7 +119,7 @@ agent_tell.gym_agent_dqn <- function(agent, results) {
   now <- scheduled_settings(agent, "learning_rate")
   agent$log[c("exploration_rate", "learning_rate")] <- c(epsilon_now(agent), now$learning_rate)
   steps <- length(results$trajectories$reward)
-  # Taken out of the agent, so that R writes into it without another copy.
+  # Take it out of the agent, so that R can write into it without another copy.
   memory <- agent$memory
   agent$memory <- NULL
   memory <- add_to_memory(memory, remembered(agent$policy, results$trajectories))
@@ -158,11 +161,11 @@ learn_from_memory <- function(agent, memory, updates, steps, settings) {
 }
 
 #' Follow the gradient of a minibatch
-#' @param policy The network, of which all but the weights counts.
+#' @param policy The network. Its own weights are ignored.
 #' @param state A list: `weights`, `target`, the weights of the target network, and `adam`.
-#' @param rows What was played: `inputs` and `next_inputs`, matrices with an observation in each
-#'   column, `action`, numbers from 1, `reward` and `terminated`.
-#' @param settings As agent_dqn() takes them, none of them a schedule.
+#' @param rows The steps: `inputs` and `next_inputs`, matrices with an observation in each column,
+#'   `action`, numbers from 1, `reward` and `terminated`.
+#' @param settings The arguments of agent_dqn(), without schedules.
 #' @return The list with new `weights` and `adam`, and the `loss` before.
 #' @noRd
 dqn_update <- function(policy, state, rows, settings) {
@@ -180,7 +183,7 @@ dqn_update <- function(policy, state, rows, settings) {
   outputs <- forward$outputs
   taken <- places_of_actions(nrow(outputs), rows$action)
   error <- outputs[taken] - wanted
-  # Huber's loss: the slope of the squared error up to 1, and then no steeper.
+  # Huber's loss: the slope of the squared error up to 1, constant beyond it.
   slopes <- matrix(0, nrow(outputs), n)
   slopes[taken] <- pmax(-1, pmin(error, 1)) / n
   gradient <- clip_norm(backward_network(forward, slopes), settings$max_grad_norm)
@@ -193,8 +196,8 @@ dqn_update <- function(policy, state, rows, settings) {
 
 # The memory ---------------------------------------------------------------------------------
 
-# A step has the numbers of the observation, those of the next one, then action, reward and whether
-# it terminated.
+# A row of the memory: the observation, the next observation, action, reward, and whether it
+# terminated.
 remembered <- function(policy, trajectories) {
   rbind(
     t(number_rows(trajectories$observation)), t(number_rows(trajectories$next_observation)),

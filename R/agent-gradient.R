@@ -1,5 +1,5 @@
-# What the agents that follow gradients share: how many episodes an iteration has, the first moments
-# of observations, and the steps of an iteration as rows.
+# Shared by the agents that follow gradients: the number of episodes per iteration, the first
+# moments of observations, and the steps of an iteration as rows.
 
 new_gradient_agent <- function(class, settings) {
   structure(
@@ -34,8 +34,8 @@ default_policy.gym_agent_gradient <- function(agent) {
   policy_network(c(NA, 64, 64, NA), bias = TRUE, output = NA, init = "orthogonal")
 }
 
-# Observations are normalised from the first step of learning on: random episodes make the first
-# moments, or the policy would jump when it is given some.
+# Observations are normalised from the first step of learning. Random episodes supply the first
+# moments; a policy that got them later would change at a stroke.
 warm_up_episodes <- 8L
 
 is_warming_up <- function(agent) identical(agent$policy$moments$count, 0)
@@ -50,10 +50,11 @@ agent_behavior.gym_agent_gradient <- function(agent) {
 }
 
 #' Put the steps of an iteration into rows
-#' @return A list: `inputs` and `last_inputs`, matrices with an observation in each column, as the
-#'   network takes them in, of each step and of the observations after the episodes' last steps;
-#'   `observations` as they were seen; `action`, the numbers of actions from 1, or a matrix with an
-#'   action in each column; `reward`, `terminated`; `last`, whether a step is an episode's last.
+#' @return A list: `inputs` and `last_inputs`, matrices with an observation in each column, prepared
+#'   for the network, of each step and of the observations after the last step of each episode;
+#'   `observations` as they were returned; `action`, the numbers of actions from 1, or a matrix with
+#'   an action in each column; `reward`, `terminated`; `last`, whether a step is the last of its
+#'   episode.
 #' @noRd
 iteration_rows <- function(policy, trajectories) {
   last <- ends_of(trajectories$episode)
@@ -76,10 +77,10 @@ network_actions <- function(policy, action) {
   }
 }
 
-#' End an iteration: count, update the moments of observations, choose how many episodes come next
+#' End an iteration: count steps, update the moments of observations, choose the number of episodes
 #'
-#' Their number is fixed before they are played. Were an iteration cut off at a number of steps, it
-#' would have more of the short episodes.
+#' The number of episodes is fixed before they are played. An iteration that stops at a number of
+#' steps would contain too many short episodes.
 #' @noRd
 end_iteration <- function(agent, results) {
   trajectories <- results$trajectories
@@ -95,7 +96,7 @@ end_iteration <- function(agent, results) {
   agent
 }
 
-# Weights that are not finite stay outside: training ends with those before.
+# If the weights are not finite, training ends with the last finite ones.
 check_finite_weights <- function(weights, agent) {
   if (!all(is.finite(weights))) {
     gym_abort(
@@ -106,7 +107,7 @@ check_finite_weights <- function(weights, agent) {
   }
 }
 
-# A network of values with the hidden layers of a policy.
+# A value network with the hidden layers of a policy.
 value_network <- function(policy) {
   sizes <- policy$sizes
   sizes[[length(sizes)]] <- 1L
@@ -136,7 +137,7 @@ draw_minibatches <- function(n, batch) {
 #' @export
 agent_log.gym_agent_gradient <- function(agent) agent$log
 
-# The settings as they are at the steps taken so far, those that are schedules, too.
+# The settings at the current number of steps, with schedules evaluated.
 scheduled_settings <- function(agent, names) {
   for (name in names) agent[[name]] <- scheduled(agent[[name]], agent$steps, name, max = Inf)
   agent
@@ -164,7 +165,7 @@ check_has_log_prob <- function(policy, name) {
   }
 }
 
-# An agent of values has one for each action.
+# An agent that learns values needs one value for each action.
 check_values <- function(policy, name) {
   space <- policy$action_space
   outputs <- policy$sizes[[length(policy$sizes)]]

@@ -1,24 +1,25 @@
 #' Hill climbing
 #'
-#' Adds noise to the best weights so far, uniformly from `-noise` to `noise`, and keeps what does
-#' better. It sticks where the best weights were lucky, or where all weights nearby do equally
-#' badly.
+#' Add uniform noise from `-noise` to `noise` to the best weights so far, and keep the result if it
+#' does better. The search gets stuck if the best weights were lucky, or if all weights nearby do
+#' equally badly.
 #'
-#' @param noise How far from the best weights a candidate may be in each weight, a number above 0.
-#' @param candidates How many candidates are played in an iteration, a whole number of at least 1;
-#'   the default is 1.
+#' @param noise The largest distance of a candidate from the best weights, in each weight, a number
+#'   above 0.
+#' @param candidates The number of candidates per iteration, a whole number of at least 1. The
+#'   default is 1.
 #' @param env The environment, as for [train_agent()].
 #' @param policy The policy, as for [train_agent()].
 #' @param iterations,total_steps,target The budget and the target, as for [train_agent()].
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and the
-#'   environment's own, such as `continuous = TRUE` for LunarLander.
-#' @return `agent_hill_climb()` an agent of class `gym_agent_hill_climb`, whose policy has the best
-#'   weights so far; `search_hill_climb()` makes that agent, trains it and returns what
-#'   [train_agent()] does.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
+#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @return `agent_hill_climb()` returns an agent of class `gym_agent_hill_climb`, whose policy has
+#'   the best weights so far. `search_hill_climb()` makes this agent, trains it and returns the
+#'   result of [train_agent()].
+#' @section Errors: `gym_error_argument` for an invalid argument.
 #' @references K. Frans (2016), Simple reinforcement learning methods to learn CartPole,
 #'   <https://kvfrans.com/simple-algoritms-for-solving-cartpole/>.
-#' @seealso [agent_ars()], [agent_cem()]; [agent_ask()] for what an agent is.
+#' @seealso [agent_ars()], [agent_cem()]; [agent_ask()] explains what an agent is.
 #' @export
 #' @examples
 #' agent_hill_climb()

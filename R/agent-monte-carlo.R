@@ -1,38 +1,37 @@
 #' Monte Carlo control
 #'
-#' Learns the value of each action in each state as the mean of the returns that followed on it, in
-#' whole episodes, and acts by these values, exploring (Sutton and Barto 2018, section 5.4). Nothing
-#' is learned from an episode before it has ended, and no value rests on another one.
+#' Learn the value of each action in each state as the mean of the returns that followed it, and act
+#' by these values with exploration (Sutton and Barto 2018, section 5.4). The agent learns from an
+#' episode only after its end. No value depends on another one.
 #'
-#' In an environment of the server that is named by its id, the server's processes play all episodes
-#' of an iteration with the table as it is, and the learner learns from them when they have ended.
-#' With exploring starts or a `mask` R plays them, in several sub-environments. In a model, or an
-#' environment in R, it learns after each episode.
+#' If `env` is an id on the server, the server's processes play all episodes of an iteration with
+#' the same table, and the learner learns from them afterwards. With exploring starts or a `mask`, R
+#' plays the episodes in several sub-environments. In a model or an environment in R, the agent
+#' learns after each episode.
 #'
-#' With `exploring_starts = TRUE` the first action of each episode is drawn from all, each equally
-#' likely (section 5.3); the environment draws the first state.
+#' With `exploring_starts = TRUE` the first action of each episode is drawn uniformly from all
+#' actions (section 5.3). The environment draws the first state.
 #'
-#' An episode that was cut off is taken as if it had ended there: what would have come later is not
-#' in its return.
+#' A truncated episode counts as if it had ended there. Its return does not contain later rewards.
 #'
 #' @inheritParams agent_q
-#' @param episodes How many episodes an iteration has, a whole number of at least 1. `NULL`, the
-#'   default, for 1,000 where the server's processes play them, and else 10.
-#' @param visits Which visits of a state and action count: `"first"`, the default, only the first
-#'   one of each episode, or `"every"` one.
+#' @param episodes The number of episodes in an iteration, a whole number of at least 1. `NULL`, the
+#'   default, is 1,000 if the server's processes play them, and 10 otherwise.
+#' @param visits Which visits of a state and action count: `"first"`, the default, for the first one
+#'   in each episode, or `"every"`.
 #' @param exploring_starts Draw the first action of each episode? `FALSE`, the default, or `TRUE`.
-#' @param learning_rate `NULL`, the default, for the mean of all returns, each of which counts the
-#'   same; a number from 0 to 1, or a function of the steps so far, lets later ones count more.
-#' @param importance `"none"`, the default, learns the values of what it does itself, exploring.
-#'   `"weighted"` and `"ordinary"` learn those of a policy that does not explore from episodes of
-#'   one that does, by importance sampling (off-policy learning; sections 5.5 to 5.7): of
-#'   `target_policy`, or without one of the best policy so far. Weighted returns are the mean of
-#'   those whose actions the policy might have taken, and every visit counts.
-#' @param target_policy The policy whose values are learned with `importance`, a [policy_table()];
-#'   what plays is the same, but explores with `epsilon`: with 1 it is a random policy. `NULL`, the
-#'   default, for the best policy so far.
-#' @return `agent_monte_carlo()` an agent of class `gym_agent_monte_carlo`; `learn_monte_carlo()`
-#'   makes that agent, trains it and returns what [train_agent()] does.
+#' @param learning_rate `NULL`, the default, for the plain mean of all returns. A number from 0 to
+#'   1, or a function of the steps so far, gives later returns more weight.
+#' @param importance `"none"`, the default, learns the values of the policy that plays, exploration
+#'   included. `"weighted"` and `"ordinary"` learn the values of a policy that does not explore from
+#'   episodes of one that does, by importance sampling (off-policy learning; sections 5.5 to 5.7).
+#'   Weighted returns are the mean over those whose actions the policy might have taken, and every
+#'   visit counts.
+#' @param target_policy The policy whose values `importance` learns, a [policy_table()]. The same
+#'   policy plays, but explores with `epsilon`; with `epsilon = 1` it is a random policy. `NULL`,
+#'   the default, uses the best policy so far.
+#' @return `agent_monte_carlo()` returns an agent of class `gym_agent_monte_carlo`.
+#'   `learn_monte_carlo()` makes this agent, trains it and returns the result of [train_agent()].
 #' @inheritSection agent_q Errors
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
@@ -141,10 +140,10 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
   )
 }
 
-#' Learn from episodes of a policy that explores the values of one that does not
+#' Learn the values of a policy that does not explore, from episodes of one that does
 #'
-#' A return counts as much as the policy is more likely to take the actions after its own (Sutton
-#' and Barto 2018, section 5.7). How likely actions were is what they were when they were taken.
+#' The weight of a return is how much more likely the policy takes the actions after its own (Sutton
+#' and Barto 2018, section 5.7). The probabilities are those at the time of the action.
 #' @noRd
 off_policy_steps <- function(agent) {
   learning <- learning_of(agent)
@@ -204,7 +203,7 @@ off_policy_steps <- function(agent) {
   )
 }
 
-# How likely the policy that is learned about takes each action, a function of a state.
+# The probability of each action under the policy that is learned about, a function of a state.
 target_probabilities <- function(agent, row) {
   if (is.null(agent$learns)) {
     return(function(x) {
@@ -221,7 +220,7 @@ agent_policy.gym_agent_monte_carlo <- function(agent) {
   if (is.null(agent$learns)) NextMethod() else agent$learns
 }
 
-# The policy that plays an iteration. Of actions with equal values one is drawn for it.
+# The policy that plays an iteration. It draws among actions with equal values.
 iteration_policy <- function(agent, weights, taken) {
   heat <- agent$temperature
   if (is.null(heat)) {
@@ -231,7 +230,7 @@ iteration_policy <- function(agent, weights, taken) {
   } else {
     heat <- scheduled(heat, taken, "temperature", lowest_temperature, Inf)
   }
-  # A state without an action is an end, where none is taken.
+  # A state without actions is an end, where no action is taken.
   weights[row_max(weights) == -Inf, ] <- 0
   policy <- policy_table(weights, rate_of(agent$epsilon, "epsilon")(taken), heat)
   policy[c("observation_space", "action_space")] <- agent$spaces
@@ -260,9 +259,9 @@ new_episode <- function() {
 }
 
 #' Keep the means of returns
-#' @return A list of functions: `learn(episode, taken)`, of the steps of a whole episode;
-#'   `learn_many()`, of the steps of several, `episode` being the number of each step's; and
-#'   `visited()`, how often each state and action has counted.
+#' @return A list of functions: `learn(episode, taken)` learns from the steps of a whole episode;
+#'   `learn_many()` from those of several, where `episode` is the number of each step's episode;
+#'   `visited()` returns how often each state and action has counted.
 #' @noRd
 new_returns <- function(agent, store) {
   visited <- agent$visited
@@ -330,7 +329,7 @@ learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target
   make_and_train("agent_monte_carlo", rlang::current_env(), ...)
 }
 
-# Where the server's processes play the episodes, each iteration costs a request.
+# If the server's processes play the episodes, each iteration costs a request.
 default_episodes <- function(env, mask, exploring_starts, importance) {
   on_server <- rlang::is_string(env) && !is_registered(env) && !grepl(modelled_ids, env)
   whole <- is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")

@@ -1,66 +1,69 @@
 #' Proximal policy optimization
 #'
-#' Plays whole episodes with a policy that draws its actions, estimates how much better each action
-#' was than what a network of values expected, and makes the better ones more likely: `epochs`
-#' passes over the steps in minibatches, in each of which an action's probability counts no further
-#' than `clip` from what it was when it was played (Schulman et al. 2017).
+#' Play whole episodes with a policy that draws its actions, estimate how much better each action
+#' was than a value network expected, and make the better actions more likely. The agent makes
+#' `epochs` passes over the steps in minibatches. Changes of an action's probability beyond `clip`
+#' do not count (Schulman et al. 2017).
 #'
 #' The policy is a [policy_network()] with the output `"softmax"` for a Discrete action space, or
-#' `"gaussian"` for a Box; by default it has two hidden layers of 64 tanh neurons. The network of
-#' values has the same hidden layers. For each minibatch the loss is that of
+#' `"gaussian"` for a Box. By default it has two hidden layers of 64 tanh neurons. The value network
+#' has the same hidden layers. The loss of a minibatch is that of
 #' [Stable-Baselines3](https://stable-baselines3.readthedocs.io/en/master/modules/ppo.html): the
 #' clipped objective, minus `entropy` times the policy's entropy, plus `value_weight` times the
-#' squared error of the values; its gradient, not longer than `max_grad_norm`, goes into Adam
+#' squared error of the values. Its gradient is clipped to `max_grad_norm` and passed to Adam
 #' (Kingma and Ba 2015, with an epsilon of 1e-5).
 #'
 #' With `epochs = 1, batch = Inf, clip = Inf` this is the advantage actor-critic A2C (Mnih et al.
-#' 2016; Huang et al. 2022), with Adam in place of RMSprop.
+#' 2016; Huang et al. 2022), with Adam instead of RMSprop.
 #'
 #' # Iterations
 #'
-#' An iteration is whole episodes, so that training can go on from any checkpoint as if it had never
-#' been interrupted. How many is fixed before they are played: `batch_steps` divided by the mean
+#' An iteration plays whole episodes, so training can resume from any checkpoint with the same
+#' result. The number of episodes is fixed before they are played: `batch_steps` divided by the mean
 #' length of the last iteration's episodes, rounded, at least `min_episodes` and at most four times
-#' as many as the last time. An episode that was truncated, by the environment or by `max_steps`,
-#' would have gone on: the value of its last state takes the place of the rewards to come. One that
-#' was terminated has none to come.
+#' the last number. An episode that the environment or `max_steps` truncated would have gone on, so
+#' the value of its last state replaces the rewards to come. A terminated episode has none to come.
 #'
-#' With a policy that has `normalize = TRUE` the first iteration is random episodes, which make the
-#' first moments of observations. Later ones are added after each iteration's learning.
+#' If the policy has `normalize = TRUE`, the first iteration plays random episodes to get the first
+#' moments of observations. Later observations are added after each iteration's learning.
 #'
-#' @param batch_steps About how many steps an iteration has, a whole number; the default is 2048.
-#' @param batch How many steps a minibatch has, about: the steps of an iteration are cut into
-#'   minibatches of nearly equal size. A number of at least 1, `Inf` for all in one; the default is
-#'   64.
-#' @param epochs How often an iteration's steps are gone through, a whole number; the default is 10.
+#' @param batch_steps The approximate number of steps in an iteration, a whole number. The default
+#'   is 2048.
+#' @param batch The approximate number of steps in a minibatch, a number of at least 1, or `Inf` for
+#'   all steps. An iteration is divided into minibatches of nearly equal size. The default is 64.
+#' @param epochs The number of passes over the steps of an iteration, a whole number. The default
+#'   is 10.
 #' @param learning_rate The step size of Adam, a number above 0, or a function of the steps so far
-#'   such as [schedule_linear()]; the default is 3e-4.
-#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
+#'   such as [schedule_linear()]. The default is 3e-4.
+#' @param gamma The discount, a number from 0 to 1. The default is 0.99.
 #' @param lambda How far advantages look ahead, a number from 0 (one step) to 1 (to the end of the
-#'   episode); the default is 0.95 (generalized advantage estimation, Schulman et al. 2016).
-#' @param clip How far from 1 the ratio of an action's probability to that when it was played may
-#'   count, a number, a function of the steps so far, or `Inf`; the default is 0.2.
-#' @param entropy How much the policy's entropy counts in the loss, a number or a function of the
-#'   steps so far; the default is 0.
-#' @param value_weight How much the squared error of values counts, a number; the default is 0.5.
-#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`; the default is 0.5.
-#' @param normalize_advantages Are the advantages of a minibatch brought to the mean 0 and the
-#'   standard deviation 1? `TRUE`, the default, or `FALSE`.
-#' @param normalize_rewards Are rewards divided by the running standard deviation of the discounted
-#'   return, and cut at 10? `FALSE`, the default, or `TRUE`. What is logged stays as it was.
-#' @param target_kl `NULL`, the default, or a number: an iteration's learning ends before a
-#'   minibatch in which the policy has moved further than 1.5 times that from the one that played
-#'   (an estimate of the Kullback-Leibler divergence).
-#' @param min_episodes The least number of episodes of an iteration; the default is 8.
+#'   episode). The default is 0.95 (generalized advantage estimation, Schulman et al. 2016).
+#' @param clip How far the ratio of an action's new to its old probability may count from 1, a
+#'   number, a function of the steps so far, or `Inf`. The default is 0.2.
+#' @param entropy The weight of the policy's entropy in the loss, a number or a function of the
+#'   steps so far. The default is 0.
+#' @param value_weight The weight of the squared error of values, a number. The default is 0.5.
+#' @param max_grad_norm The largest length of a gradient, a number or `Inf`. The default is 0.5.
+#' @param normalize_advantages Scale the advantages of a minibatch to mean 0 and standard deviation
+#'   1? `TRUE`, the default, or `FALSE`.
+#' @param normalize_rewards Divide rewards by the running standard deviation of the discounted
+#'   return and clip them at 10? `FALSE`, the default, or `TRUE`. The log shows the original
+#'   rewards.
+#' @param target_kl `NULL`, the default, or a number. Learning from an iteration stops before a
+#'   minibatch in which the policy has moved more than 1.5 times this number from the one that
+#'   played (an estimate of the Kullback-Leibler divergence).
+#' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars
-#' @param policy The policy; `NULL`, the default, is the preset's, or the one told above.
-#' @return `agent_ppo()` an agent of class `gym_agent_ppo`; `learn_ppo()` makes that agent, trains
-#'   it and returns what [train_agent()] does. Its history, and the log, have for each iteration
-#'   `approx_kl`, `clip_fraction`, `entropy_loss`, `explained_variance`, `loss`,
-#'   `policy_gradient_loss`, `value_loss` and `learning_rate`, as Stable-Baselines3 names them.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, a policy
-#'   that does not draw its actions by their probability, and observations that are no vectors;
-#'   `gym_error_agent` when weights become infinite or `NaN`: the training that the condition has as
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described
+#'   above.
+#' @return `agent_ppo()` returns an agent of class `gym_agent_ppo`. `learn_ppo()` makes this agent,
+#'   trains it and returns the result of [train_agent()]. For each iteration its history and the log
+#'   have `approx_kl`, `clip_fraction`, `entropy_loss`, `explained_variance`, `loss`,
+#'   `policy_gradient_loss`, `value_loss` and `learning_rate`, named as in Stable-Baselines3.
+#' @section Errors: `gym_error_argument` for an invalid argument, a policy that does not draw its
+#'   actions by their probability, or observations that are not vectors. `gym_error_agent` if
+#'   weights become infinite or `NaN`; the field `result` is the training with the last finite
+#'   weights.
 #'   `result` has the last good ones.
 #' @references J. Schulman et al. (2017), Proximal policy optimization algorithms, arXiv:1707.06347.
 #'
@@ -131,7 +134,7 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
   }
   weights <- c(weight_vector(agent$policy), weight_vector(agent$value))
 
-  # How likely the actions were, and what was expected, by the networks that played.
+  # Log-probabilities and values by the networks that played.
   before <- ppo_forward(agent$policy, agent$value, weights, rows$inputs, rows$action)
   last_value <- expected_values(agent$value, rows$last_inputs)
   after <- next_values(before$value, last_value, rows$terminated, rows$last)
@@ -158,13 +161,13 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
 }
 
 #' Follow the gradient through all minibatches
-#' @param policy,value The networks, of which all but the weights counts.
+#' @param policy,value The networks. Their own weights are ignored.
 #' @param weights The weights of both, one after the other.
-#' @param rows What was played: `inputs`, `action`, `log_prob`, `advantage` and `return`.
+#' @param rows The steps: `inputs`, `action`, `log_prob`, `advantage` and `return`.
 #' @param epochs A list with a list of minibatches, vectors of row numbers, for each epoch.
-#' @param settings As agent_ppo() takes them, none of them a schedule.
-#' @return A list: `weights`, `adam`, and `log`, of which the divergence is that of the last epoch,
-#'   the loss that of the last minibatch, the others means.
+#' @param settings The arguments of agent_ppo(), without schedules.
+#' @return A list: `weights`, `adam`, and `log`, with the divergence of the last epoch, the loss of
+#'   the last minibatch, and means of the others.
 #' @noRd
 ppo_update <- function(policy, value, weights, adam, rows, epochs, settings) {
   log <- list()
@@ -234,7 +237,6 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   ))
 }
 
-# Both networks, forwards.
 ppo_forward <- function(policy, value, weights, inputs, action) {
   count <- count_weights(policy)
   of_policy <- forward_network(policy, weights, inputs)

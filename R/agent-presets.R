@@ -1,27 +1,32 @@
-# Settings that solve an environment, written down beside each other, and the functions that make an
-# agent and train it in one call.
+# Settings that solve environments, and the functions that make an agent and train it in one call.
 
 #' Settings that solve environments
 #'
-#' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()] and [learn_dqn()] take these
-#' settings where the environment is named by its id and has a row here, and say so. Arguments that
-#' are given take the place of the preset's.
+#' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()] and [learn_dqn()] use these
+#' settings if the environment is given by its id and has a row here. A message says so. Arguments
+#' that you give replace those of the preset.
 #'
-#' @param env_id The id of an environment, a string, for its presets alone; `NULL`, the default, for
-#'   all.
-#' @return A data frame with a row for each preset: `env_id` (a string), `kwargs` (the environment's
-#'   own arguments that it is for, as JSON, empty for none), `agent` (`"ars"`, `"cem"`, `"ppo"`,
-#'   `"reinforce"` or `"dqn"`), the agent's arguments (see [agent_ars()] and the others; `NA` where
-#'   it has no such one, or keeps its default), of the policy of a search `hidden` (how many hidden
-#'   neurons a network has, which are tanh and see normalised observations, `NA` for a linear
-#'   policy) and `bias` (a logical), of the others `normalize` (whether their network sees
-#'   normalised observations), of the training `episodes`,
-#'   `total_steps` (its budget), and where they come from: `origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is how
-#'   many settings were tried (an integer), with the seeds 1 to 99, before these were chosen;
-#'   `vignette("solved")` reports other seeds. Where `linear` is `TRUE`, `learning_rate` and `clip`
-#'   go from their numbers to 0 in `total_steps`; `epsilon` goes from 1 to its number in
-#'   `epsilon_steps`.
-#' @section Errors: `gym_error_argument` when `env_id` is no string.
+#' @param env_id The id of an environment, a string, to get its presets only. `NULL`, the default,
+#'   returns all.
+#' @return A data frame with a row for each preset:
+#'   \describe{
+#'   \item{env_id, kwargs}{The environment's id, a string, and its arguments as JSON, empty for
+#'   none.}
+#'   \item{agent}{`"ars"`, `"cem"`, `"ppo"`, `"reinforce"` or `"dqn"`. The agent's arguments have a
+#'   column each, see [agent_ars()] and the others; `NA` for an argument that the agent does not
+#'   have or whose default it keeps.}
+#'   \item{hidden, bias}{The policy of a search: the number of hidden neurons (tanh, with normalised
+#'   observations), `NA` for a linear policy, and whether it has a bias.}
+#'   \item{normalize}{Whether the network of the other agents gets normalised observations.}
+#'   \item{linear, epsilon_steps}{If `linear` is `TRUE`, `learning_rate` and `clip` decrease from
+#'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
+#'   `epsilon_steps`.}
+#'   \item{episodes, total_steps}{Of the training; `total_steps` is its budget.}
+#'   \item{origin, source, tried}{`origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is
+#'   the number of settings that were tried with seeds 1 to 99 before these were chosen (an
+#'   integer). `vignette("solved")` reports other seeds.}
+#'   }
+#' @section Errors: `gym_error_argument` if `env_id` is not a string.
 #' @export
 #' @examples
 #' agent_presets()[c("env_id", "agent", "directions", "step_size", "noise", "origin")]
@@ -39,8 +44,7 @@ agent_presets <- function(env_id = NULL) {
   presets
 }
 
-# The preset of an agent for an environment with these arguments, a list; `NULL` where there is
-# none.
+# The preset of an agent for an environment with these arguments, a list, or `NULL`.
 find_preset <- function(agent, env, kwargs) {
   if (!is.character(env)) {
     return(NULL)
@@ -57,12 +61,11 @@ find_preset <- function(agent, env, kwargs) {
   NULL
 }
 
-# What a row of the table has.
 preset_settings <- function(row) {
   Filter(function(value) !is.na(value) && !identical(value, ""), as.list(row))
 }
 
-# What a preset gives the function that makes its agent.
+# The arguments that a preset supplies to the function that makes its agent.
 preset_arguments <- function(preset) {
   if (isTRUE(preset$linear)) {
     falling <- intersect(c("learning_rate", "clip"), names(preset))
@@ -76,21 +79,20 @@ preset_arguments <- function(preset) {
 
 preset_maker <- function(preset) get(paste0("agent_", preset$agent), mode = "function")
 
-# The agent of a row of the table.
 preset_agent <- function(row) {
   preset <- preset_settings(row)
   rlang::exec(preset_maker(preset), !!!preset_arguments(preset))
 }
 
-# An empty list may have names or none.
+# Two empty lists are equal, with names or without.
 sorted_by_name <- function(values) if (length(values)) values[order(names(values))] else list()
 
 #' Make an agent and train it
 #'
-#' @param make The function that makes the agent, its name.
-#' @param frame The frame of the user's call, which has the agent's arguments, `env` and some of
-#'   [train_agent()]. What is `NULL` was not given.
-#' @param ... Further arguments of [train_agent()], and the environment's own.
+#' @param make The name of the function that makes the agent.
+#' @param frame The frame of the user's call, which has the agent's arguments, `env` and some of the
+#'   arguments of [train_agent()]. `NULL` means not given.
+#' @param ... Further arguments of [train_agent()] and of the environment.
 #' @noRd
 make_and_train <- function(make, frame, ...) {
   check_no_steps(...names(), frame)
@@ -105,13 +107,13 @@ make_and_train <- function(make, frame, ...) {
   preset <- find_preset(sub("agent_", "", make), env, kwargs)
   own <- intersect(of_agent, names(given))
   arguments <- if (!is.null(preset)) preset_arguments(preset) else list()
-  # A part of the candidates that was meant for another number of them, or another version.
+  # The preset's `top` was meant for another number of directions, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
   agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
   training <- c(given[setdiff(names(given), own)], dots[names(dots) %in% of_training])
-  # A budget of the user's own is the only one.
+  # The user's budget replaces the preset's.
   budget <- any(c("iterations", "total_steps") %in% names(training))
   check_spelling(names(kwargs), c(of_agent, of_training), budget || !is.null(preset), frame)
   if (is.null(preset) && !budget) {

@@ -1,60 +1,62 @@
 #' Q-learning
 #'
-#' Learns the value of each action in each state by moving it, after each step, towards the reward
-#' and the value of the best action in the state that the step led to (Watkins 1989; Sutton and
-#' Barto 2018, section 6.5).
+#' Learn the value of each action in each state. After each step, a value moves towards the reward
+#' plus the discounted value of the best action in the next state (Watkins 1989; Sutton and Barto
+#' 2018, section 6.5).
 #'
-#' `double = TRUE` keeps two tables, one of which chooses the best action and the other values it,
-#' so that luck is not taken for value (van Hasselt 2010; section 6.7). `planning` is how many
-#' remembered steps are learned from again after each real one (Dyna-Q; section 8.2), where the last
-#' outcome of each state and action is remembered.
+#' `double = TRUE` keeps two tables. One chooses the best action and the other one values it, which
+#' avoids overestimated values (van Hasselt 2010; section 6.7). `planning` is the number of
+#' remembered steps to learn from after each real one (Dyna-Q; section 8.2). The agent remembers the
+#' last outcome of each state and action.
 #'
-#' While it learns it draws among actions with equal values; the policy that it returns takes the
-#' first of them. Where the model is known, an action that a state does not have is never taken.
+#' During learning, the agent draws among actions with equal values. The policy that it returns
+#' takes the first of them. If the model is known, the agent never takes an action that a state does
+#' not have.
 #'
-#' Where the model of the environment is known (see [env_model()]) the policy is judged by it,
-#' exactly and without playing; the evaluations then have 0 episodes and a standard error of 0.
+#' If the model of the environment is known (see [env_model()]), the policy is evaluated exactly,
+#' without playing. The evaluations then have 0 episodes and a standard error of 0.
 #'
-#' @param discount The discount, a number above 0 and at most 1; the default is 0.99.
+#' @param discount The discount, a number above 0 and at most 1. The default is 0.99.
 #' @param learning_rate How far a value moves towards its target, a number from 0 to 1, or a
-#'   function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this,
-#'   whatever number of tiles it is made of; with features of a function by this times the sum of
-#'   their squares.
-#' @param epsilon How often it explores, a number from 0 to 1, or a function of the steps so far.
-#' @param temperature The temperature of softmax exploration, in place of `epsilon`, a number above
-#'   0 or a function of the steps so far; `NULL`, the default, for none. See [policy_table()].
-#' @param initial The value that all actions have at first, a number; a large one makes it try
-#'   everything ("optimistic"). The default is 0. With features of a function it is the first weight
-#'   of all of them, or a number for each.
-#' @param features `NULL`, the default, for a table with a row for each state; what [tile_coding()]
-#'   makes; or a function of a batch of observations that returns a numeric matrix with a row of
-#'   features for each.
+#'   function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this
+#'   share for any number of tiles. With a function as `features` it moves by this share times the
+#'   sum of the squared features.
+#' @param epsilon The probability of exploring, a number from 0 to 1, or a function of the steps so
+#'   far.
+#' @param temperature The temperature of softmax exploration, which replaces `epsilon`, a number
+#'   above 0 or a function of the steps so far. `NULL`, the default, for none. See [policy_table()].
+#' @param initial The first value of all actions, a number. The default is 0. A large value makes
+#'   the agent try everything ("optimistic"). With a function as `features` it is the first weight
+#'   of all features, or a number for each.
+#' @param features `NULL`, the default, for a table with a row for each state; the result of
+#'   [tile_coding()]; or a function of a batch of observations that returns a numeric matrix with a
+#'   row of features for each observation.
 #' @param double Double Q-learning? `FALSE`, the default, or `TRUE`.
-#' @param planning How many remembered steps to learn from after each real one, a whole number;
-#'   tables only. The default is 0.
-#' @param bonus What planning adds to the reward of an action that was last taken k steps ago, times
-#'   the square root of k (Dyna-Q+; section 8.3), a number such as 0.001. Actions that were never
-#'   taken in a state that was seen are planned with, too, as if they stayed there for no reward.
-#'   The default is 0, for none.
-#' @param mask The name of the element of the environment's info that says which actions can be
-#'   taken, such as `"action_mask"` of Taxi: a number for each action, 0 for one that must not be.
-#'   What it forbids at an observation is never taken there again, and its value is `-Inf`; tables
-#'   only. `NULL`, the default, for none.
+#' @param planning The number of remembered steps to learn from after each real one, a whole number.
+#'   For tables only. The default is 0.
+#' @param bonus A number such as 0.001. Planning adds it, times the square root of k, to the reward
+#'   of an action that was last taken k steps ago (Dyna-Q+; section 8.3). Planning then includes
+#'   actions that were never taken in a visited state, as if they led back to it with no reward. The
+#'   default is 0, for none.
+#' @param mask The name of the element of the environment's info that marks the valid actions, such
+#'   as `"action_mask"` of Taxi: a number for each action, 0 for an invalid one. The agent never
+#'   takes an action again at an observation where it was marked invalid, and its value is `-Inf`.
+#'   For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()].
 #' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. An
-#'   iteration are `episodes` episodes.
-#' @param episodes How many episodes make an iteration, a whole number; the default is 10.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `num_envs`, and the
-#'   environment's own, such as `is_slippery = FALSE`.
-#' @return `agent_q()` an agent of class `gym_agent_q`; `learn_q()` makes that agent, trains it and
-#'   returns what [train_agent()] does. Its `$policy` takes the action with the largest value, and
-#'   [state_values()] gives the values.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, actions that
-#'   are not Discrete, or observations that a table has no rows for.
+#'   iteration has `episodes` episodes.
+#' @param episodes The number of episodes in an iteration, a whole number. The default is 10.
+#' @param ... Further arguments of [train_agent()], such as `seed` or `num_envs`, and of the
+#'   environment, such as `is_slippery = FALSE`.
+#' @return `agent_q()` returns an agent of class `gym_agent_q`. `learn_q()` makes this agent, trains
+#'   it and returns the result of [train_agent()]. Its `$policy` takes the action with the largest
+#'   value, and [state_values()] returns the values.
+#' @section Errors: `gym_error_argument` for an invalid argument, actions that are not Discrete, or
+#'   observations that do not fit a table.
 #' @references C. Watkins (1989), Learning from Delayed Rewards, PhD thesis, Cambridge. H. van
 #'   Hasselt (2010), Double Q-learning, NeurIPS 23. R. S. Sutton and A. G. Barto (2018),
 #'   Reinforcement Learning: An Introduction, second edition, MIT Press.
-#' @seealso [learn_sarsa()], [learn_monte_carlo()], [learn_td()]; [agent_observe()] for what a
+#' @seealso [learn_sarsa()], [learn_monte_carlo()], [learn_td()]; [agent_observe()] explains what a
 #'   learner is.
 #' @export
 #' @examples
@@ -117,7 +119,7 @@ learner_of.gym_agent_q <- function(agent) {
       taken <<- taken + 1
       if (!is.null(memory)) {
         memory$remember(x, column, reward, after, terminated, taken)
-        # No steps of the environment: schedules stay where they are.
+        # Planned steps are not steps of the environment: schedules do not advance.
         memory$plan(taken)
       }
       if (ended) NA_integer_ else choose(row(after), taken)
@@ -130,8 +132,8 @@ learner_of.gym_agent_q <- function(agent) {
   )
 }
 
-# A coin decides for each step which of the two tables learns from it: it chooses the best action
-# that follows, and the other one says what that is worth.
+# A coin decides for each step which of the two tables learns from it. That table chooses the best
+# next action; the other one values it.
 double_steps <- function(agent) {
   learning <- learning_of(agent)
   first <- learning$store
@@ -168,8 +170,8 @@ double_steps <- function(agent) {
 }
 
 #' Remember the last outcome of each state and action, and learn from these again
-#' @return A list of functions: `remember()` a step, `plan(taken)`, and `get()`, the memory as the
-#'   agent keeps it.
+#' @return A list of functions: `remember()` a step, `plan(taken)`, and `get()`, the memory in the
+#'   form that the agent keeps.
 #' @noRd
 new_planning_memory <- function(agent, store) {
   rows <- nrow(agent$weights)
@@ -200,7 +202,7 @@ new_planning_memory <- function(agent, store) {
       if (bonus > 0) {
         for (other in which(store$row(x) > -Inf)) {
           pair <- x + rows * (other - 1L)
-          # As if it had been tried when the training began.
+          # As if it had been tried when training began.
           if (is.na(reward[[pair]])) enter(pair, 0, x, FALSE, 0)
         }
       }

@@ -1,59 +1,55 @@
 #' Repeat a random search with many seeds
 #'
-#' One search says little about how long searches take, as its round is a matter of chance.
-#' `search_repeat()` plays [search_random()] once with each of many seeds, in an environment
-#' that is made once, and keeps in one row what came of each. Plotted, the rounds that
-#' the searches needed stand beside the geometric distribution that they follow.
+#' Play [search_random()] once with each of many seeds, in one environment, and keep a row of
+#' results for each. One search says little about how long searches take, because its number of
+#' rounds is random. A plot shows the rounds that the searches needed, with the geometric
+#' distribution that they follow.
 #'
-#' The row of a seed is what `search_random(seed = )` gives with that seed and the same
-#' arguments: call it to see that search again, or to have its policy. (Only an
-#' environment that was made before and remembers something beyond a reset, such as one wrapped
-#' in `NormalizeReward`, may differ.) As each search is seeded, the session's generator is left as
-#' it was.
+#' The row of a seed is the result of `search_random(seed = )` with that seed and the same
+#' arguments. Call it to see that search again or to get its policy. (Results may differ in an
+#' environment made before that remembers something beyond a reset, such as one wrapped in
+#' `NormalizeReward`.) The session's random number generator is left as it was.
 #'
-#' # The chance of a round
+#' # The success probability of a round
 #'
-#' Each round draws its weights anew, so that all have the same chance to reach the target,
-#' and how many it takes is geometrically distributed. The chance is estimated by maximum
-#' likelihood: the searches that were solved divided by all rounds that were played, in
-#' searches that were not solved within `rounds` rounds, too (they are censored, and leaving
-#' them out would make the chance look better than it is).
+#' Each round draws new weights, so all rounds have the same chance to reach the target, and the
+#' number of rounds has a geometric distribution. The probability is estimated by maximum
+#' likelihood: the number of solved searches divided by the number of all rounds. Rounds of unsolved
+#' searches count, too. These searches are censored, and leaving them out would overestimate the
+#' probability.
 #'
 #' # When it ends early
 #'
-#' Interrupted (Ctrl-C, or Esc), it returns the searches that were finished, with a message.
-#' An error in the middle has the class `gym_error_search` beside its own, and the searches
-#' before it are the element `result` of the condition.
+#' If you interrupt it (Ctrl-C, or Esc), it returns the finished searches, with a message. An error
+#' has the class `gym_error_search` in addition to its own, and its field `result` has the finished
+#' searches.
 #'
 #' @inheritParams search_random
-#' @param rounds How many rounds a search plays at most, a whole number of at least 1; the
-#'   default is 50.
-#' @param target The mean return of a round that ends a search, a number. `NULL`, the
-#'   default, is the environment's own reward threshold; one that has none needs a target.
-#' @param seeds The seeds, different whole numbers; the default is 1 to 100. With CartPole
-#'   each takes about a third of a second.
-#' @return An object of class `gym_searches`, which [print()], [summary()], [as.data.frame()]
-#'   and [plot()][plot.gym_searches()] know; a list with the elements
+#' @param rounds The largest number of rounds in a search, a whole number of at least 1. The default
+#'   is 50.
+#' @param target The mean return of a round that ends a search, a number. `NULL`, the default, uses
+#'   the environment's reward threshold. Give a target if it has none.
+#' @param seeds The seeds, different whole numbers. The default is 1 to 100. With CartPole each
+#'   takes about a third of a second.
+#' @return An object of class `gym_searches`, with methods for [print()], [summary()],
+#'   [as.data.frame()] and [plot()][plot.gym_searches()]. It is a list with the elements
 #'   \describe{
-#'     \item{searches}{A data frame with one row for each seed: `seed` (a whole number), `solved`
-#'       (logical), `round` (integer, the round that reached the target, `NA` where none
-#'       did), `rounds` (integer, how many were played), `mean_return` (double, of the best
-#'       round), `steps` (integer), `elapsed` (double, in seconds). `as.data.frame()` gives
-#'       it.}
-#'     \item{chance, se}{The chance of a round to reach the target and its standard error,
-#'       doubles; `NA` when no search was finished, the error also when no search was
-#'       solved.}
-#'     \item{env_id, target, template, max_rounds, episodes, max_steps}{What was searched:
-#'       the environment's id, the target, `policy`, `rounds`, `episodes`, `max_steps`.}
-#'     \item{elapsed}{The seconds that it took, a double.}
-#'     \item{interrupted}{Whether it was interrupted, a logical.}
+#'   \item{searches}{A data frame with one row for each seed: `seed` (a whole number), `solved`
+#'   (logical), `round` (integer, the round that reached the target, or `NA`), `rounds` (integer,
+#'   the number of rounds played), `mean_return` (double, of the best round), `steps` (integer),
+#'   `elapsed` (double, in seconds). `as.data.frame()` returns it.}
+#'   \item{chance, se}{The success probability of a round and its standard error, doubles. `NA` if
+#'   no search was finished. The error is also `NA` if no search was solved.}
+#'   \item{env_id, target, template, max_rounds, episodes, max_steps}{The environment's id, the
+#'   target, `policy`, `rounds`, `episodes`, `max_steps`.}
+#'   \item{elapsed}{The time it took in seconds, a double.}
+#'   \item{interrupted}{Whether it was interrupted, a logical.}
 #'   }
-#'   `summary()` gives an object of class `summary.gym_searches`, a list with the elements
-#'   `searches` (the object), `share` (of the searches that were solved, a double) and
-#'   `rounds` (quartiles and mean of the rounds of these, a named numeric vector of length
-#'   6).
-#' @section Errors: Those of [search_random()]; `gym_error_argument` also for an environment
-#'   without a reward threshold when no target is given.
+#'   `summary()` returns an object of class `summary.gym_searches`, a list with the elements
+#'   `searches` (the object), `share` (the share of solved searches, a double) and `rounds`
+#'   (quartiles and mean of the rounds of solved searches, a named numeric vector of length 6).
+#' @section Errors: As for [search_random()]. Also `gym_error_argument` for an environment without a
+#'   reward threshold if no target is given.
 #' @inheritSection search_random Warnings
 #' @references The geometric distribution and its estimate from censored numbers: J. F.
 #'   Lawless, *Statistical Models and Methods for Lifetime Data* (2003). The standard error is
@@ -123,7 +119,7 @@ new_searches <- function(trained, given) {
   )
 }
 
-#' Estimate the chance of a round, as `?search_repeat` describes
+#' Estimate the success probability of a round, as `?search_repeat` describes
 #' @noRd
 round_chance <- function(searches) {
   solved <- sum(searches$solved)

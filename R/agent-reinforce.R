@@ -1,42 +1,44 @@
 #' REINFORCE
 #'
-#' Plays whole episodes with a policy that draws its actions, and makes each action more likely in
+#' Play whole episodes with a policy that draws its actions, and make each action more likely in
 #' proportion to the discounted return that followed it (Williams 1992; Sutton and Barto 2018,
-#' sections 13.3 and 13.4): one step of Adam along the mean, over all steps, of (return - baseline)
-#' times the gradient of the action's log-probability.
+#' sections 13.3 and 13.4). Each iteration takes one step of Adam along the mean, over all steps, of
+#' (return - baseline) times the gradient of the action's log-probability.
 #'
-#' The baseline is a network of values with the policy's hidden layers, fitted after each iteration
-#' to the returns by `value_updates` steps of Adam. Without a baseline the return itself counts. An
-#' episode that was truncated would have gone on: with a baseline the value of its last state takes
-#' the place of the rewards to come; without one nothing can, and its returns are too low.
+#' The baseline is a value network with the policy's hidden layers. After each iteration it is
+#' fitted to the returns by `value_updates` steps of Adam. Without a baseline the return itself
+#' counts. A truncated episode would have gone on: with a baseline, the value of its last state
+#' replaces the rewards to come. Without one nothing replaces them, and its returns are too low.
 #'
-#' Sutton and Barto multiply each step by `gamma^t`, which counts late steps less, as the gradient
-#' of the discounted return from the start asks for. This agent leaves the factor out, as nearly all
-#' implementations do: it would hardly learn from the end of an episode.
+#' Sutton and Barto multiply each step by `gamma^t`, so that late steps count less. This is the
+#' gradient of the discounted return from the start. Like nearly all implementations, this agent
+#' leaves the factor out, because it would hardly learn from the end of an episode.
 #'
 #' Iterations, normalised observations and the default policy are those of [agent_ppo()].
 #'
-#' @param batch_steps About how many steps an iteration has, a whole number; the default is 1000.
+#' @param batch_steps The approximate number of steps in an iteration, a whole number. The default
+#'   is 1000.
 #' @param learning_rate The step size of Adam for the policy, a number above 0, or a function of the
-#'   steps so far such as [schedule_linear()]; the default is 0.01.
-#' @param gamma The discount, a number from 0 to 1; the default is 0.99.
-#' @param baseline Is there a baseline? `TRUE`, the default, or `FALSE`.
-#' @param value_learning_rate The step size of Adam for the baseline; the default is 0.01.
-#' @param value_updates How many steps of Adam the baseline takes after each iteration, a whole
-#'   number; the default is 20.
-#' @param entropy How much the policy's entropy counts beside the return, a number or a function of
-#'   the steps so far; the default is 0.
-#' @param normalize_advantages Are the factors of the log-probabilities brought to the mean 0 and
-#'   the standard deviation 1? `TRUE`, the default, or `FALSE`.
-#' @param max_grad_norm The greatest length of a gradient, a number, or `Inf`, the default.
-#' @param min_episodes The least number of episodes of an iteration; the default is 8.
+#'   steps so far such as [schedule_linear()]. The default is 0.01.
+#' @param gamma The discount, a number from 0 to 1. The default is 0.99.
+#' @param baseline Use a baseline? `TRUE`, the default, or `FALSE`.
+#' @param value_learning_rate The step size of Adam for the baseline. The default is 0.01.
+#' @param value_updates The number of steps of Adam for the baseline after each iteration, a whole
+#'   number. The default is 20.
+#' @param entropy The weight of the policy's entropy relative to the return, a number or a function
+#'   of the steps so far. The default is 0.
+#' @param normalize_advantages Scale the factors of the log-probabilities to mean 0 and standard
+#'   deviation 1? `TRUE`, the default, or `FALSE`.
+#' @param max_grad_norm The largest length of a gradient, a number, or `Inf`, the default.
+#' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars
-#' @param policy The policy; `NULL`, the default, is the preset's, or that of [agent_ppo()].
-#' @return `agent_reinforce()` an agent of class `gym_agent_reinforce`; `learn_reinforce()` makes
-#'   that agent, trains it and returns what [train_agent()] does. Its history, and the log, have for
-#'   each iteration `entropy_loss`, `explained_variance`, `policy_gradient_loss`, `value_loss` and
-#'   `learning_rate`.
-#' @section Errors: As [agent_ppo()].
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or that of
+#'   [agent_ppo()].
+#' @return `agent_reinforce()` returns an agent of class `gym_agent_reinforce`. `learn_reinforce()`
+#'   makes this agent, trains it and returns the result of [train_agent()]. For each iteration its
+#'   history and the log have `entropy_loss`, `explained_variance`, `policy_gradient_loss`,
+#'   `value_loss` and `learning_rate`.
+#' @section Errors: As for [agent_ppo()].
 #' @references R. J. Williams (1992), Simple statistical gradient-following algorithms for
 #'   connectionist reinforcement learning, Machine Learning 8.
 #'

@@ -1,20 +1,21 @@
 #' Sarsa
 #'
-#' Learns the value of what it does itself: a value moves towards the reward and the value of the
-#' action that is taken next (Rummery and Niranjan 1994; Sutton and Barto 2018, section 6.4). Beside
-#' a cliff it therefore learns to keep away from the edge, over which exploring would lead it.
+#' Learn the values of the exploring policy itself. A value moves towards the reward plus the
+#' discounted value of the action that is taken next (Rummery and Niranjan 1994; Sutton and Barto
+#' 2018, section 6.4). Beside a cliff, the agent therefore learns to keep away from the edge, where
+#' exploring would make it fall.
 #'
-#' `expected = TRUE` takes the mean over what might be done next instead (section 6.6). `n` looks n
-#' steps ahead (section 7.2), and `lambda` over all numbers of steps, with weights that decrease, by
-#' eligibility traces (section 12.7): replacing ones, and accumulating ones for features of your
-#' own.
+#' `expected = TRUE` uses the mean over the possible next actions instead (section 6.6). `n` looks n
+#' steps ahead (section 7.2). `lambda` combines all numbers of steps, with decreasing weights, by
+#' eligibility traces (section 12.7): replacing traces, and accumulating ones if `features` is a
+#' function.
 #'
 #' @inheritParams agent_q
 #' @param expected Expected Sarsa? `FALSE`, the default, or `TRUE`.
-#' @param n How many steps to look ahead, a whole number of at least 1, the default.
+#' @param n The number of steps to look ahead, a whole number of at least 1, the default.
 #' @param lambda How slowly traces fade, a number from 0, the default, to 1. Only with `n = 1`.
-#' @return `agent_sarsa()` an agent of class `gym_agent_sarsa`; `learn_sarsa()` makes that agent,
-#'   trains it and returns what [train_agent()] does.
+#' @return `agent_sarsa()` returns an agent of class `gym_agent_sarsa`. `learn_sarsa()` makes this
+#'   agent, trains it and returns the result of [train_agent()].
 #' @inheritSection agent_q Errors
 #' @references G. A. Rummery and M. Niranjan (1994), On-line Q-learning using connectionist systems,
 #'   CUED/F-INFENG/TR 166, Cambridge. R. S. Sutton and A. G. Barto (2018), Reinforcement Learning:
@@ -72,7 +73,7 @@ learner_of.gym_agent_sarsa <- function(agent) {
       }
       learn(x, column, reward, ahead, ended, sub_env, taken)
       taken <<- taken + 1
-      # What was chosen is done, where the episode goes on.
+      # The chosen action is taken if the episode goes on.
       following
     },
     export = function(agent) {
@@ -82,7 +83,7 @@ learner_of.gym_agent_sarsa <- function(agent) {
   )
 }
 
-# The mean of the values over what might be done.
+# The mean of the values over the next actions.
 expected_value <- function(agent, values, taken) {
   values <- matrix(values, 1L)
   exploring <- list(

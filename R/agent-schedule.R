@@ -1,14 +1,14 @@
-# Numbers of a learner that may change with the steps that it has taken.
+# Settings of a learner that change with the number of steps it has taken.
 
 #' Change a number while an agent learns
 #'
-#' Makes a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of how
-#' many steps it has observed. Any function of this kind will do; these are the usual ones.
+#' Make a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of the
+#' number of steps observed so far. Any such function works; these are the usual ones.
 #'
-#' @param from,to The number in the first step, and after `duration`, where it stays.
-#' @param duration How many steps it takes, a number of at least 1.
-#' @return A function of a number of steps. `schedule_linear()` goes in equal parts,
-#'   `schedule_exponential()` by equal factors (both numbers are above 0 then).
+#' @param from,to The value in the first step, and the value after `duration` steps, where it stays.
+#' @param duration The number of steps from `from` to `to`, a number of at least 1.
+#' @return A function of a number of steps. `schedule_linear()` changes in equal amounts,
+#'   `schedule_exponential()` by equal factors (both values must be above 0).
 #' @section Errors: `gym_error_argument`.
 #' @export
 #' @examples
@@ -34,7 +34,7 @@ schedule_exponential <- function(from, to, duration) {
   })
 }
 
-# A checkpoint tells two schedules apart by their numbers, not by what a function has kept.
+# A checkpoint compares schedules by these numbers, not by the function's environment.
 new_schedule <- function(from, to, duration, f) {
   structure(f, from = from, to = to, duration = duration, class = c("gym_schedule", "function"))
 }
@@ -48,7 +48,7 @@ print.gym_schedule <- function(x, ...) {
 
 # Inside of learners ------------------------------------------------------------------------
 
-# Below this a softmax is the choice of the best.
+# Below this, a softmax takes the best action.
 lowest_temperature <- 1e-12
 
 check_schedule <- function(x, arg, min, max, call) {
@@ -58,7 +58,7 @@ check_schedule <- function(x, arg, min, max, call) {
   }
 }
 
-# The number 0 is a choice; a schedule that stays there is a slip.
+# The number 0 is a choice; a schedule that is always 0 is a mistake.
 check_explores <- function(epsilon, call) {
   is_zero <- function(taken) isTRUE(tryCatch(epsilon(taken) == 0, error = function(cnd) FALSE))
   if (is.function(epsilon) && all(vapply(c(0, 10^(0:8)), is_zero, NA))) {
@@ -70,7 +70,6 @@ check_explores <- function(epsilon, call) {
   }
 }
 
-# A number that may change with the steps that were taken so far.
 scheduled <- function(x, taken, arg, min = 0, max = 1) {
   if (!is.function(x)) {
     return(x)
@@ -86,5 +85,4 @@ scheduled <- function(x, taken, arg, min = 0, max = 1) {
   value
 }
 
-# The text of a schedule.
 schedule_text <- function(x) if (is.function(x)) "scheduled" else number_text(x)

@@ -1,28 +1,28 @@
 #' Temporal-difference prediction
 #'
-#' Learns what each state is worth to a given policy, by moving its value, after each step, towards
-#' the reward and the value of the state that the step led to (Sutton and Barto 2018, section 6.1).
-#' `n` looks n steps ahead (section 7.1), and `lambda` over all numbers of steps, by eligibility
-#' traces (section 12.2).
+#' Learn the value of each state under a given policy. After each step, the value of a state moves
+#' towards the reward plus the discounted value of the next state (Sutton and Barto 2018, section
+#' 6.1). `n` looks n steps ahead (section 7.1). `lambda` combines all numbers of steps by
+#' eligibility traces (section 12.2).
 #'
 #' @inheritParams agent_sarsa
-#' @param policy The policy whose values are learned, and which plays: any that [rollout()] plays.
-#' @param initial The value that all states have at first, a number; the default is 0. With features
-#'   of a function the first weight of all features, or a number for each.
-#' @param behavior Another policy, which plays in the place of `policy`: then each step counts as
-#'   many times as much as `policy` is more likely to act so (off-policy learning by importance
-#'   sampling; sections 5.5 and 11.1). Both must say how likely their actions are: a
+#' @param policy The policy to evaluate, which also plays: any policy that [rollout()] accepts.
+#' @param initial The first value of all states, a number. The default is 0. With a function as
+#'   `features` it is the first weight of all features, or a number for each.
+#' @param behavior Another policy, which plays instead of `policy`. Each step is then weighted by
+#'   how much more likely `policy` is to take its action (off-policy learning by importance
+#'   sampling; sections 5.5 and 11.1). The probabilities of both must be known: use a
 #'   [policy_table()] or a [policy_random()]. `NULL`, the default, for none.
-#' @param iterations,total_steps The budget, as for [train_agent()]. An iteration are `episodes`
+#' @param iterations,total_steps The budget, as for [train_agent()]. An iteration has `episodes`
 #'   episodes.
-#' @param target The mean return at which training ends; the default is none, as learning values has
-#'   no return to reach.
-#' @return `agent_td()` an agent of class `gym_agent_td`; `learn_td()` makes that agent, trains it
-#'   and returns what [train_agent()] does. [state_values()] gives the values.
+#' @param target The mean return at which training ends. By default there is none, because learning
+#'   values does not change the return.
+#' @return `agent_td()` returns an agent of class `gym_agent_td`. `learn_td()` makes this agent,
+#'   trains it and returns the result of [train_agent()]. [state_values()] returns the values.
 #' @inheritSection agent_q Errors
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
-#' @seealso [solve_mdp()], which calculates them where the model is known
+#' @seealso [solve_mdp()], which calculates the values if the model is known
 #' @export
 #' @examples
 #' walk <- gym_model(data.frame(
@@ -48,7 +48,7 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   new_learner("gym_agent_td", settings)
 }
 
-# Both must say how likely they act so, and what counts is one step.
+# The probabilities of both must be known, and only one step ahead is weighted.
 check_behavior <- function(policy, behavior, n, lambda, call = rlang::caller_env()) {
   for (arg in c("policy", "behavior")) {
     value <- get(arg)
@@ -118,8 +118,8 @@ learner_of.gym_agent_td <- function(agent) {
   steps
 }
 
-# How much more likely the policy that is learned about acts so than the one that plays: a function
-# of an observation, a batch of one, and the number of an action.
+# How much more likely `policy` takes an action than the policy that plays: a function of an
+# observation (a batch of one) and the number of an action.
 importance_ratio <- function(agent) {
   space <- agent$spaces$observation_space
   index <- table_index(space, "observations", NULL)$index
@@ -151,8 +151,8 @@ weighted_lookahead <- function(agent, store) {
 
 #' Make the function by which a given policy acts, one observation at a time
 #'
-#' Of a table, and of chance, the probabilities of the actions are known beforehand. Any other is
-#' asked; where there are several sub-environments it was asked about all of them together.
+#' For a table or a random policy the probabilities of the actions are known in advance. Any other
+#' policy is asked; with several sub-environments it was asked about all of them together.
 #' @noRd
 policy_chooser <- function(agent, probabilities, draw) {
   if (is.null(probabilities)) {
@@ -171,8 +171,8 @@ policy_chooser <- function(agent, probabilities, draw) {
   }
 }
 
-# How likely a policy takes each action: a matrix with a row for each state, a vector where the
-# state makes no difference, `NULL` where that is not known beforehand.
+# The probability of each action: a matrix with a row for each state, a vector if it does not depend
+# on the state, `NULL` if it is not known in advance.
 chooser_probabilities <- function(policy, action_space, by_state) {
   if (inherits(policy, "gym_policy_table") && by_state) {
     table_probabilities(policy)

@@ -1,9 +1,8 @@
-# How far a learner looks ahead: one step, n steps, or over all of them by eligibility traces.
+# How far a learner looks ahead: one step, n steps, or all of them by eligibility traces.
 
-#' Make the function that moves a value towards what a step has come to
-#' @return A function of `x` and `column`, whose value is moved; `reward`; `ahead`, the value of
-#'   what the step led to, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so
-#'   far.
+#' Make the function that moves a value towards its target
+#' @return A function of `x` and `column`, whose value moves; `reward`; `ahead`, the value of the
+#'   next state, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so far.
 #' @noRd
 lookahead <- function(agent, store) {
   rate <- rate_of(agent$learning_rate)
@@ -20,7 +19,7 @@ lookahead <- function(agent, store) {
   }
 }
 
-# Each sub-environment has one of what `make()` makes, which knows what its episode has been.
+# Each sub-environment gets its own result of `make()`, which holds the state of its episode.
 for_each_sub_env <- function(make) {
   made <- list()
   function(sub_env) {
@@ -29,17 +28,17 @@ for_each_sub_env <- function(make) {
   }
 }
 
-# Traces of 1 that have faded to less than this are left out: a hundred millionth of an error.
+# Traces that have faded from 1 to less than this are dropped: a hundred millionth of an error.
 least_trace <- 1e-8
 
-#' Remember which weights have been there, and move all of them
+#' Remember the weights that were used, and move all of them
 #'
-#' Replacing traces for tables and tiles, accumulating ones for a user's features (Sutton and Barto
-#' 2018, sections 12.2 and 12.7).
-#' @param decay By how much a trace fades with each step.
-#' @param sparse Whether features are 1 or 0, so that small traces can be left out.
-#' @return A list of functions: `pass(cells, gradient, by)`, which enters these weights and moves
-#'   all that have a trace by `by` times that, and `clear()`, for the end of an episode.
+#' Traces are replacing for tables and tiles, and accumulating for a user's features (Sutton and
+#' Barto 2018, sections 12.2 and 12.7).
+#' @param decay The factor by which a trace fades in each step.
+#' @param sparse Whether features are 1 or 0, so that small traces can be dropped.
+#' @return A list of functions: `pass(cells, gradient, by)`, which adds these weights and moves all
+#'   that have a trace by `by` times the trace, and `clear()`, for the end of an episode.
 #' @noRd
 new_trace <- function(store, decay, replacing, sparse = replacing) {
   strength <- numeric()
@@ -114,7 +113,7 @@ new_recent_steps <- function(agent, store) {
     columns[[count]] <<- column
     rewards[[count]] <<- reward
     if (ended) {
-      # At the end of an episode all that are left have come to something.
+      # At the end of an episode all remaining steps have their targets.
       while (length(rewards)) learn_first(ahead, rate)
     } else if (count == n) {
       learn_first(ahead, rate)

@@ -1,13 +1,13 @@
-# What the learners of values have in common: how they begin, act, and move a value towards a
-# target.
+# Shared by the learners of values: how they start, act, and move a value towards a target.
 
 #' Make a learner of values
 #'
 #' @param class Its class.
-#' @param settings What the user has chosen, a list, among it `features`, `discount`,
-#'   `learning_rate`, `epsilon`, `temperature` and `initial`, and perhaps `n` and `lambda`.
-#' @return While it learns it has `basis`, see [basis_of()], and `weights`, a matrix with a row for
-#'   each feature and a column for each action; and `taken`, how many steps it has observed.
+#' @param settings The user's settings, a list with `features`, `discount`, `learning_rate`,
+#'   `epsilon`, `temperature` and `initial`, and perhaps `n` and `lambda`.
+#' @return The learner. During learning it also has `basis`, see [basis_of()]; `weights`, a matrix
+#'   with a row for each feature and a column for each action; and `taken`, the number of steps
+#'   observed.
 #' @noRd
 new_learner <- function(class, settings) {
   structure(settings, class = c(class, "gym_value_learner", "gym_learner", "gym_agent"))
@@ -39,7 +39,7 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
 }
 
-# With features of a function it may be a number for each.
+# With a function as `features` it may be a number for each feature.
 check_initial <- function(settings, call) {
   initial <- plain_numbers(settings$initial, "initial", call)
   several <- is.function(settings$features) && length(initial) > 1L
@@ -69,7 +69,7 @@ agent_start.gym_value_learner <- function(agent, policy) {
   agent
 }
 
-# How many columns the weights have: one for each action.
+# The number of columns of the weights: one for each action by default.
 value_columns_of <- function(agent) UseMethod("value_columns_of")
 
 #' @exportS3Method
@@ -80,7 +80,7 @@ first_weights <- function(agent, policy) {
     check_first_table(agent, policy)
     weights <- policy$q
   } else if (is.na(agent$basis$count)) {
-    # A user's function has not been asked yet.
+    # The user's function has not been called yet.
     return(NULL)
   } else {
     rows <- agent$basis$count
@@ -94,7 +94,7 @@ first_weights <- function(agent, policy) {
     weights <- matrix(as.double(agent$initial) / agent$basis$each, rows, columns)
   }
   if (is.null(agent$features) && identical(dim(weights), dim(policy$possible))) {
-    # What a state does not have is never taken; of an end no action is.
+    # An action that a state does not have is never taken. A terminal state has no actions.
     weights[!policy$possible & rowSums(policy$possible) > 0] <- -Inf
   }
   weights
@@ -111,12 +111,12 @@ check_first_table <- function(agent, policy) {
 
 # Learning ----------------------------------------------------------------------------
 
-#' What the functions of a learner share
+#' Make the functions that all learners of values share
 #'
-#' They are closures over plain numbers, for one step at a time: a vector's element is changed in
-#' place, where an agent that is passed on from step to step would be copied.
+#' They are closures over plain numbers, for one step at a time. An element of a vector is changed
+#' in place; an agent that is passed from step to step would be copied.
 #' @return A list: `store`, see [value_store()]; `choose`, see [action_chooser()]; `learn`, see
-#'   [lookahead()]; `uniform`, where all of them draw from, see [uniform_draws()].
+#'   [lookahead()]; `uniform`, the source of their random numbers, see [uniform_draws()].
 #' @noRd
 learning_of <- function(agent) {
   uniform <- uniform_draws()
@@ -127,11 +127,11 @@ learning_of <- function(agent) {
   )
 }
 
-#' Make a learner of what its steps do
+#' Make a learner from the functions of its steps
 #' @param learning As [learning_of()] makes it.
-#' @param begin,observe,export Its own, as [learner_of()] describes them; `export` returns the
-#'   agent without what all have.
-#' @param stores All its tables, in which masks are noted.
+#' @param begin,observe,export The learner's own, as [learner_of()] describes them; `export` returns
+#'   the agent without the shared elements.
+#' @param stores All its tables, in which masks are recorded.
 #' @noRd
 new_steps <- function(agent, learning, begin, observe, export,
                       stores = list(learning$store), act = NULL, whole = NULL) {
@@ -149,16 +149,16 @@ new_steps <- function(agent, learning, begin, observe, export,
   )
 }
 
-#' Keep values that are linear in what is present of an observation
+#' Keep values that are linear in the features of an observation
 #'
-#' @param basis As [basis_of()] returns it. In what follows `x` is what its `one()` returns.
-#' @param weights A matrix with a row for each feature and a column for each action; `NULL` where a
-#'   user's function has not told yet how many features there are.
-#' @param initial The first weights where `weights` is `NULL`: a number, or one for each feature.
-#' @return A list of functions: `row(x)`, the values of all actions; `value(x, column)`, that of
-#'   one; `toward(x, column, target, rate)`, which moves it; `cells(x, column)`, the weights that it
-#'   is the sum of, and `gradient(x)`, what each of them counts; `add(cells, by)`; `forbid(x,
-#'   forbidden)`, after which these actions are never taken; `get()`, the weights.
+#' @param basis As [basis_of()] returns it. Below, `x` is the result of its `one()`.
+#' @param weights A matrix with a row for each feature and a column for each action; `NULL` if the
+#'   number of features of a user's function is not known yet.
+#' @param initial The first weights if `weights` is `NULL`: a number, or one for each feature.
+#' @return A list of functions: `row(x)`, the values of all actions; `value(x, column)`, the value
+#'   of one; `toward(x, column, target, rate)`, which moves it; `cells(x, column)`, the weights in
+#'   its sum, and `gradient(x)`, their factors; `add(cells, by)`; `forbid(x, forbidden)`, after
+#'   which these actions are never taken; `get()`, the weights.
 #' @noRd
 value_store <- function(basis, weights, initial, columns) {
   if (is.null(basis$each)) {
@@ -238,7 +238,7 @@ check_first_weights <- function(initial, count) {
 
 #' Make the function by which a learner chooses an action
 #'
-#' Of equal values it draws one, so that a learner which knows nothing yet goes everywhere.
+#' It draws among equal values, so that a new learner explores everything.
 #' @param draw Draws a number from 0 to 1.
 #' @return A function of the values of the actions and the steps so far, which returns the number of
 #'   an action, from 1.
@@ -275,17 +275,16 @@ abort_diverged <- function() {
   )
 }
 
-# The place that a number from 0 to 1 falls on, where each has a share that is proportional to its
+# The place that a number from 0 to 1 falls on, if each place has a share proportional to its
 # weight.
 draw_place <- function(weight, u) {
   until <- cumsum(weight)
   count <- length(until)
   place <- sum(until <= u * until[[count]]) + 1L
-  # By rounding the number may lie at the end of all.
+  # By rounding the number may lie beyond the last place.
   if (place > count) max(which(weight > 0)) else place
 }
 
-# A function of the steps so far that gives a learner's rate.
 rate_of <- function(rate, name = "learning_rate") {
   if (is.function(rate)) function(taken) scheduled(rate, taken, name) else function(taken) rate
 }
@@ -311,16 +310,18 @@ weights_policy <- function(agent, columns) {
 
 # Results -----------------------------------------------------------------------------
 
-#' Get the values that were learned
+#' Get the learned values
 #'
-#' @param x What `learn_q()` and the others returned, or their agent.
-#' @param actions Get the value of each action? `FALSE`, the default, or `TRUE`.
-#' @return Where observations are Discrete, a numeric vector with an element for each state, named
-#'   by its number: the value of its best action, or, from [learn_td()], that of the state. Where
-#'   they have several parts, as those of Blackjack, a data frame with a column for each part, under
-#'   its name, and `value`. With `actions = TRUE` a data frame with a row for each state and action:
-#'   the column `state`, or one for each part, `action` (its number) and `value`. States that were
-#'   never left, such as ends, have the value that all had at first.
+#' @param x The result of `learn_q()` and the like, or their agent.
+#' @param actions Return the value of each action? `FALSE`, the default, or `TRUE`.
+#' @return For Discrete observations, a numeric vector with an element for each state, named by its
+#'   number: the value of its best action, or, from [learn_td()], the value of the state. For
+#'   observations with several parts, such as Blackjack's, a data frame with a column for each part,
+#'   under its name, and `value`. With `actions = TRUE` a data frame with a row for each state and
+#'   action: the column `state`, or one for each part, `action` (its number) and `value`. States
+#'   that were never left, such as terminal ones, keep their first value.
+#' @section Errors: `gym_error_argument` if `x` was not learned by a table or by features of
+#'   Discrete observations.
 #' @section Errors: `gym_error_argument` for what was not learned by a table, nor by features of
 #'   Discrete observations.
 #' @export
@@ -350,7 +351,7 @@ state_values <- function(x, actions = FALSE) {
       row.names = NULL
     ))
   }
-  # Of a policy that was given, over what it does.
+  # Under a given policy, the mean over its actions.
   values <- if (is.null(agent$learns) || ncol(q) == 1L) {
     row_max(q)
   } else {
@@ -363,7 +364,6 @@ state_values <- function(x, actions = FALSE) {
   }
 }
 
-# The values of the actions in each state.
 value_table <- function(agent) {
   weights <- action_weights(agent)
   if (is.null(agent$features)) {
@@ -373,7 +373,7 @@ value_table <- function(agent) {
   linear_values(agent$basis, weights, agent$basis$of(states, length(states)))
 }
 
-# The table of values that the greedy policy is by.
+# The table of values of the greedy policy.
 action_weights <- function(agent) UseMethod("action_weights")
 
 #' @exportS3Method

@@ -1,42 +1,41 @@
 #' gym: R at the wheel of Gymnasium
 #'
-#' Plays the environments of [Gymnasium](https://gymnasium.farama.org) from R.
-#' [gym_make()] makes an environment, [rollout()] plays a policy in it,
-#' [search_random()] finds the weights of a small neural network that solves
-#' it. The classic client calls ([env_create()], [env_reset()], [env_step()]
-#' and the others) work as they always did.
+#' Use the environments of [Gymnasium](https://gymnasium.farama.org) from R. [gym_make()] makes an
+#' environment, [rollout()] plays a policy in it, and [search_random()] finds the weights of a small
+#' neural network that solves it. The classic client calls ([env_create()], [env_reset()],
+#' [env_step()] and the others) work as they always did.
 #'
 #' @section Words:
 #' * **Environment**: a task. A step takes an *action* and gives an *observation* and a *reward*.
-#' * **Space**: the set to which actions or observations belong, see [space_sample()].
-#' * **Episode**: the steps from a reset to the end, which comes by the task's own rules
+#' * **Space**: the set that actions or observations belong to, see [space_sample()].
+#' * **Episode**: the steps from a reset to the end. An episode ends by the rules of the task
 #'   (*terminated*) or by a limit (*truncated*). Its *return* is the sum of its rewards.
-#' * **Vector environment**: `num_envs` *sub-environments* that are stepped at once; the column
-#'   `sub_env` counts them, the argument `which` picks some.
-#' * **Policy**: what chooses the actions, a function of the observation.
-#' * **Candidate**: one set of weights that a search tries; an **iteration** tries one or several.
-#' * **Instance**: an environment on a server, which has an id there.
+#' * **Vector environment**: `num_envs` *sub-environments* that are stepped together. The column
+#'   `sub_env` holds their numbers; the argument `which` selects some of them.
+#' * **Policy**: a function of the observation that chooses the action.
+#' * **Candidate**: one set of weights that a search tries. An **iteration** tries one or several.
+#' * **Instance**: an environment on a server, where it has an id.
 #'
 #' @section Errors:
 #' Every error of this package has class `gym_error` and one of these classes:
 #'
 #' | class | when |
 #' |---|---|
-#' | `gym_error_argument` | an argument is not what the function takes; nothing was sent |
+#' | `gym_error_argument` | an argument has a wrong value; nothing was sent |
 #' | `gym_error_space` | an action or observation does not fit its space |
 #' | `gym_error_environment` | a function of an environment written in R raised an error |
-#' | `gym_error_http` | the server refused |
-#' | `gym_error_connection` | no server there, connection lost, time over; an answer that is none |
+#' | `gym_error_http` | the server refused the request |
+#' | `gym_error_connection` | no server, connection lost, timeout, or an unreadable answer |
 #' | `gym_error_server_start` | a server could not be started |
-#' | `gym_error_install` | what the server needs could not be installed |
-#' | `gym_error_checkpoint` | a search or a training cannot go on from its file, or not keep one |
-#' | `gym_error_search` | a search ended early; what was played is its field `result` |
-#' | `gym_error_training` | the same of a training |
-#' | `gym_error_agent` | an agent returned what it must not, or a candidate's return is not finite |
+#' | `gym_error_install` | the server's software could not be installed |
+#' | `gym_error_checkpoint` | a checkpoint cannot be read, resumed or written |
+#' | `gym_error_search` | a search failed early; the field `result` has the finished part |
+#' | `gym_error_training` | a training failed early; the field `result` has the finished part |
+#' | `gym_error_agent` | an agent returned a wrong value, or a return is not finite |
 #'
-#' A `gym_error_http` also has a class with the status, such as
-#' `gym_error_http_400`, and the fields `status` (a number), `code` (a word for
-#' programs, such as `"unknown_instance"`) and `hint` (a string or `NULL`).
+#' A `gym_error_http` also has a class with the status, such as `gym_error_http_400`, and the fields
+#' `status` (a number), `code` (a word for programs, such as `"unknown_instance"`) and `hint` (a
+#' string or `NULL`).
 #'
 #' ```r
 #' tryCatch(
@@ -47,13 +46,13 @@
 #' ```
 #'
 #' @section Options:
-#' `gym.max_answer_bytes`: how many bytes an answer of a server may have, a number; the default is
-#' 2^29, half a gigabyte. Of JSON, of which R makes much more, it may be a sixteenth. A larger
-#' answer ends with a `gym_error_connection` as soon as so much has come. Compressed
-#' answers are not decompressed. `gym.viewer` is described at [env_watch()].
+#' `gym.max_answer_bytes`: the largest answer that is accepted from a server, in bytes. The default
+#' is 2^29 (half a gigabyte). The limit for JSON is a sixteenth of this number, because R needs much
+#' more memory for it. A larger answer raises a `gym_error_connection` as soon as the limit is
+#' passed. Compressed answers are not decompressed. `gym.viewer` is described at [env_watch()].
 #'
-#' Whatever a server says in an error or by a name is shown without control characters, and cut
-#' where it is long.
+#' Texts from a server, in errors and names, are shown without control characters and shortened if
+#' they are long.
 #'
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
