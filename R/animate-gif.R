@@ -1,12 +1,12 @@
 #' Write frames as a GIF file
 #'
-#' Of each picture only the part that differs from the one before is kept: all of them whole would
-#' take ImageMagick a gigabyte for an episode of CartPole, and more than many systems allow it.
+#' Each frame keeps only the part that differs from the one before. With whole frames ImageMagick
+#' would need a gigabyte for an episode of CartPole, more than many systems allow.
 #'
 #' @param pngs A list of PNG files, each a raw vector, all of one size.
-#' @param delays How long each is shown, in hundredths of a second.
-#' @param width Of the pictures, in pixels; `NULL` for their own.
-#' @return The size of the pictures in pixels, width and height.
+#' @param delays The time for each frame, in hundredths of a second.
+#' @param width The width in pixels; `NULL` for the frames' own.
+#' @return The size of the frames in pixels, width and height.
 #' @noRd
 write_gif <- function(pngs, file, delays, width = NULL) {
   before <- NULL
@@ -15,7 +15,7 @@ write_gif <- function(pngs, file, delays, width = NULL) {
     image <- magick::image_background(magick::image_read(pngs[[i]]), "white")
     if (!is.null(width)) image <- magick::image_scale(image, as.character(width))
     pixels <- magick::image_data(image, "rgb")
-    # A part keeps its place, its delay, and that it stays until the next one covers it.
+    # A part keeps its place and its delay, and stays until the next one covers it.
     image <- in_plain_letters(
       magick::image_animate(image, delay = delays[[i]], dispose = "none")
     )
@@ -27,10 +27,10 @@ write_gif <- function(pngs, file, delays, width = NULL) {
   dim(pixels)[2:3]
 }
 
-#' Find the smallest rectangle outside of which two pictures are the same
+#' Find the smallest rectangle that contains all differences of two frames
 #' @param before,now Raw arrays of channels x width x height.
-#' @return A list: `x`, `y` (the first column and row, from 0), `width`, `height`; a single
-#'   pixel where nothing differs, all where there is nothing before.
+#' @return A list: `x`, `y` (the first column and row, from 0), `width`, `height`; a single pixel if
+#'   nothing differs, the whole frame if there is none before.
 #' @noRd
 changed_part <- function(before, now) {
   size <- dim(now)[2:3]
@@ -44,8 +44,8 @@ changed_part <- function(before, now) {
   list(x = x[[1L]] - 1L, y = y[[1L]] - 1L, width = diff(x) + 1L, height = diff(y) + 1L)
 }
 
-# The colour space in which GIF files are written: from any other ImageMagick would look
-# for colours once more, with dithering, in 128 MB and a tenth of a second each time.
+# The colour space of GIF files. From any other one ImageMagick would choose colours again, with
+# dithering, in 128 MB and a tenth of a second per frame.
 crop_image <- function(image, part) {
   area <- magick::geometry_area(part$width, part$height, part$x, part$y)
   magick::image_quantize(
@@ -53,8 +53,7 @@ crop_image <- function(image, part) {
   )
 }
 
-# ImageMagick looks for the format "gif" in capital and in small letters, which in a Turkish locale
-# are others.
+# ImageMagick changes the case of the format "gif"; in a Turkish locale that gives other letters.
 in_plain_letters <- function(code) {
   locale <- Sys.getlocale("LC_CTYPE")
   on.exit(Sys.setlocale("LC_CTYPE", locale))

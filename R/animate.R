@@ -1,4 +1,4 @@
-#' Make a moving picture of an episode
+#' Make an animation of an episode
 #'
 #' Writes an episode as an animated GIF file, or as an MP4 video: of a rollout one that was played
 #' with `frames = TRUE`,
@@ -105,9 +105,9 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
 #' @export
 animate.function <- animate.gym_policy
 
-# gganimate has a generic function of the same name. Whichever of the two packages was attached
-# last, `animate()` finds these methods. They are registered when gganimate is loaded, so that it
-# need not be installed.
+# gganimate has a generic function of the same name. `animate()` finds these methods whichever of
+# the two packages was attached last. They are registered when gganimate is loaded, so it need not
+# be installed.
 register_with_gganimate <- function() {
   if (isNamespaceLoaded("gganimate")) {
     register_animate(asNamespace("gganimate"))
@@ -126,8 +126,7 @@ register_animate <- function(home) {
   registerS3method("animate", "gym_policy", animate.gym_policy, envir = home)
 }
 
-# Everything that can be wrong is checked before an episode is played. Returns the file's absolute
-# path.
+# Checks everything before an episode is played. Returns the file's absolute path.
 check_animation <- function(file, fps, width, every, call = rlang::caller_env()) {
   check_number(fps, min = 0.1, allow_null = TRUE, call = call)
   check_count(width, max = 65535, allow_null = TRUE, call = call)
@@ -187,16 +186,16 @@ new_animation <- function(frames, file, fps, width, every) {
   )
 }
 
-# The environment's own metadata, which may be anything, says how many frames make a second.
+# The environment's metadata, which may be anything, has the number of frames per second.
 frame_rate <- function(frames) {
   fps <- attr(frames, "fps")
   if (is_number(fps) && fps > 0) fps else 30
 }
 
 #' Plan which frames to show, and for how long
-#' @param n How many frames there are.
-#' @return A list: `steps`, after which the frames were taken, and `delays`, in hundredths of
-#'   a second, rounded so that their errors do not add up.
+#' @param n The number of frames.
+#' @return A list: `steps`, the number of steps before each frame, and `delays`, in hundredths of a
+#'   second, rounded so that errors do not add up.
 #' @noRd
 animation_plan <- function(n, fps, every = NULL, fastest = fastest_fps) {
   every <- shown_every(every, fps, fastest)
@@ -241,7 +240,7 @@ print.gym_animation <- function(x, ...) {
   invisible(x)
 }
 
-# RStudio's viewer shows only files below the session's temporary directory.
+# RStudio's viewer shows only files in the session's temporary directory.
 among_temporary_files <- function(file) {
   folders <- paste0(normalizePath(c(dirname(file), tempdir()), "/"), "/")
   if (startsWith(folders[[1L]], folders[[2L]])) {

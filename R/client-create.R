@@ -1,48 +1,42 @@
 #' Create a client for a Gym server
 #'
-#' A client knows where a server is and keeps one connection to it open. It
-#' talks to no server until it is first used. Scripts that only want to play an
-#' environment need none: [gym_client()] has one ready.
+#' A client holds the address of a server and one open connection to it. It contacts the server at
+#' the first call. Scripts that only play environments do not need a client: [gym_client()] supplies
+#' one.
 #'
-#' In an interactive session, where nobody listens at an address of this machine such
-#' as `"http://127.0.0.1:5000"`, the first call asks once whether to start a server there, as
-#' [gym_server_start()] does. A script is not asked: with no server there the first
-#' call fails and says what starts one.
+#' If nobody listens at an address of this machine, such as `"http://127.0.0.1:5000"`, the first
+#' call in an interactive session asks once whether to start a server there, as [gym_server_start()]
+#' does. In a script the first call fails, and the error says how to start a server.
 #'
-#' A client may be saved with [saveRDS()], sent to another process and used in a
-#' forked one; each copy makes a connection of its own.
+#' You can save a client with [saveRDS()], send it to another process and use it in a forked one.
+#' Each copy opens its own connection.
 #'
-#' Calls that change something on the server (creating, resetting, stepping,
-#' closing) carry an idempotency key. When a connection breaks before the answer has
-#' arrived the client repeats the call with the same key, and the server
-#' answers without doing it a second time.
+#' Calls that change something on the server (creating, resetting, stepping, closing) carry an
+#' idempotency key. If a connection breaks before the answer arrives, the client repeats the call
+#' with the same key. The server then returns its first answer and does nothing twice.
 #'
-#' A server that has the protocol of gym-http-api alone, as the original one does, is played
-#' by the classic calls. What it would ignore (`num_envs`, a seed of a reset) is an error of class
-#' `gym_error_http` with code `not_supported`, and so are [gym_make()] and all that is played with
-#' it. Nor is a call repeated there when its connection breaks, as such a server would do it twice.
+#' A server that has only the protocol of gym-http-api, such as the original one, works with the
+#' classic calls. What it would ignore (`num_envs`, a seed of a reset) raises a `gym_error_http`
+#' with code `not_supported`. So do [gym_make()] and the functions that need it. Calls to such a
+#' server are not repeated if the connection breaks, because it would do them twice.
 #'
-#' @param remote_base The server's address, a string such as
-#'   `"http://127.0.0.1:5000"`.
-#' @param timeout How long a call may take before it fails with
-#'   `gym_error_connection`, in seconds; the default is 60. Connecting may take
-#'   10 seconds of it.
-#' @param config Further settings for the connection, made with httr:
-#'   [httr::authenticate()], [httr::add_headers()], [httr::use_proxy()] or
-#'   several of them joined by [c()]. What [httr::set_config()] has set for the whole session
-#'   at the time of a call holds, too, except for a proxy where the server is on this machine.
-#' @param token What the server asks everybody for, a string; `NULL` or `""` for nothing. The
-#'   default is the server's own token where this session started it, and else what the environment
-#'   variable `GYM_SERVER_TOKEN` holds, so that no script has to. It is sent with each call, to this
-#'   server only, and nothing that is printed and no error shows it. A saved client holds it: such a
-#'   file is as secret as the token.
-#' @return An object of class `GymClient`, a list with the element
-#'   `remote_base`.
-#' @section Errors: `gym_error_argument` when the address is not an http or https
-#'   URL, the timeout not a positive number or the token no string of visible ASCII
-#'   characters. The first call raises `gym_error_server_start` when a server
-#'   that was to be started could not be, and `gym_error_install` when what it needs
-#'   could not be installed.
+#' @param remote_base The server's address, a string such as `"http://127.0.0.1:5000"`.
+#' @param timeout The time after which a call fails with `gym_error_connection`, in seconds. The
+#'   default is 60. Up to 10 seconds of it are for connecting.
+#' @param config Further settings for the connection, made with httr: [httr::authenticate()],
+#'   [httr::add_headers()], [httr::use_proxy()] or several of them joined by [c()]. Settings made by
+#'   [httr::set_config()] before a call also apply, except for a proxy if the server is on this
+#'   machine.
+#' @param token The token that the server requires, a string; `NULL` or `""` for none. The default
+#'   is the server's own token if this session started it, and otherwise the environment variable
+#'   `GYM_SERVER_TOKEN`, which keeps the token out of scripts. It is sent with each call, to this
+#'   server only. Printing and errors never show it. A saved client contains it, so keep such a file
+#'   secret.
+#' @return An object of class `GymClient`, a list with the element `remote_base`.
+#' @section Errors: `gym_error_argument` if the address is not an http or https URL, the timeout is
+#'   not a positive number or the token is not a string of visible ASCII characters. The first call
+#'   raises `gym_error_server_start` if a server could not be started, and `gym_error_install` if
+#'   its software could not be installed.
 #' @export
 #' @examples
 #' server <- create_GymClient("http://gym.example.org:5000")
@@ -56,7 +50,7 @@
 create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
                              token = Sys.getenv("GYM_SERVER_TOKEN")) {
   is_default <- missing(token)
-  # First, as every later error would show the call.
+  # Evaluate the token first: any later error would show the call with it.
   token <- as_token(token)
   check_string(remote_base)
   if (!grepl("^https?://[^/]", remote_base)) {
@@ -83,18 +77,16 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
 
 #' Send a request to any route of the server
 #'
-#' The building blocks of the classic client, kept for routes that have no
-#' function of their own. `get_request()` reads, `post_request()` changes
-#' something on the server.
+#' Use these building blocks of the classic client for routes without a function of their own.
+#' `get_request()` reads; `post_request()` changes something on the server.
 #'
 #' @inheritParams env_create
 #' @param route The path of the request, a string such as `"/v1/envs/"`.
-#' @param data For `post_request()` the fields of the request's JSON body, for
-#'   `get_request()` those of its query, of one value each: a named list, `NULL` for none.
-#' @return The answer's JSON as nested lists, `NULL` (invisibly) for an empty
-#'   answer.
-#' @section Errors: `gym_error_http` when the server refuses,
-#'   `gym_error_connection` when there is no answer.
+#' @param data A named list, or `NULL` for none. `post_request()` sends it as the fields of the JSON
+#'   body, `get_request()` as the query, with one value each.
+#' @return The answer's JSON as nested lists, `NULL` (invisibly) for an empty answer.
+#' @section Errors: `gym_error_http` if the server refuses the request, `gym_error_connection` if
+#'   there is no answer.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -137,7 +129,7 @@ query_text <- function(data) {
   if (!length(data)) {
     return("")
   }
-  # R writes the numbers of as.character() only when they are looked at.
+  # as.character() is lazy: R formats the numbers only when it reads them.
   values <- with_decimal_point(
     vapply(data, function(value) curl::curl_escape(enc2utf8(as.character(value))), "")
   )
@@ -146,15 +138,13 @@ query_text <- function(data) {
 
 #' Read a server's answer or raise its error
 #'
-#' What the classic client does with each answer; for scripts that use httr on
-#' their own.
+#' The classic client does this with each answer. Use it in scripts that call httr directly.
 #'
-#' @param response An answer as [httr::GET()] or [httr::POST()] return it.
-#' @return The answer's JSON as nested lists, `NULL` (invisibly) for an empty
-#'   answer.
-#' @section Errors: `gym_error_http` and `gym_error_http_` with the status, such
-#'   as `gym_error_http_400`, when the server refused; `gym_error_connection`
-#'   when the answer is not JSON.
+#' @param response The result of [httr::GET()] or [httr::POST()].
+#' @return The answer's JSON as nested lists, `NULL` (invisibly) for an empty answer.
+#' @section Errors: `gym_error_http` and `gym_error_http_` with the status, such as
+#'   `gym_error_http_400`, if the server refused the request. `gym_error_connection` if the answer
+#'   is not JSON.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' # One that asks for no token, as httr would have to send it.

@@ -1,10 +1,10 @@
-# The question whether a server should be started at the address that a script names.
+# Ask whether to start a server at the address that a script names.
 
-#' Ask whether to start a server where a client found nobody listening
+#' Ask whether to start a server if nobody listens at a client's address
 #'
-#' For scripts written for the classic client, which name a server on this machine that was to be
-#' started by hand. The first request of a client asks, see [prompted_server_starts()]; a session
-#' that is not interactive is not asked, nor one that declined for that address before.
+#' For scripts written for the classic client, whose users started a server on this machine by hand.
+#' The first request of a client asks, see [prompted_server_starts()]. It does not ask in a session
+#' that is not interactive, nor again after a "no" for this address.
 #' @return Whether a server was started.
 #' @noRd
 prompt_for_server <- function(client, call = rlang::caller_env()) {
@@ -17,19 +17,19 @@ prompt_for_server <- function(client, call = rlang::caller_env()) {
     return(FALSE)
   }
   place <- local_place(base)
-  # Without a token of its own, as the script's client knows none.
+  # Without a token: the script's client has none.
   server <- start_server(
     place$port, options = list(host = place$host), token = FALSE, call = call
   )
-  # The script may call the same address by another name, such as localhost.
+  # The script may use another name for the same address, such as localhost.
   the_session$servers[[base]] <- the_session$servers[[server$remote_base]]
   everybody <- if (is.null(server$token)) ", for any account of this machine"
   cli::cli_inform(c(v = "The server at {base} is ready{everybody}. It stops with this R session."))
   TRUE
 }
 
-# Whether a client expects a server on this machine where nobody listens. An address behind
-# a proxy is not this machine's.
+# Whether a client expects a server on this machine and nobody listens there. An address behind a
+# proxy is not on this machine.
 is_vacant <- function(client) {
   base <- client$remote_base
   !is.null(local_place(base)) && is.null(client$config$options$proxy) &&

@@ -1,18 +1,17 @@
-# The session's own client, which functions take that are given none.
+# The session's own client, the default of functions with an argument `client`.
 
 #' Use the session's server
 #'
-#' Returns the client that functions take when they are given none. It talks to
-#' the server that the environment variable `GYM_SERVER_URL` names or, without
-#' it, to one on this machine, which is started at the first call and stops with
-#' the session. That one takes calls from this session alone, by a token that nobody else knows (see
-#' [gym_server_start()]); a server that `GYM_SERVER_URL` names is sent the token that
-#' `GYM_SERVER_TOKEN` holds.
+#' Return the session's client, the default client of other functions. It uses the server at the
+#' address in the environment variable `GYM_SERVER_URL`, with the token in `GYM_SERVER_TOKEN`.
+#' Without that variable, the first call starts a server on this machine, which stops with the
+#' session. This server accepts calls from this session only, by a secret token (see
+#' [gym_server_start()]).
 #'
 #' @inheritSection gym_server_start Where there is no Python
-#' @return A client, as [create_GymClient()] makes it.
-#' @section Errors: `gym_error_server_start` when no server could be started;
-#'   `gym_error_install` when a Python environment was to be installed first, and could not be.
+#' @return A client, as returned by [create_GymClient()].
+#' @section Errors: `gym_error_server_start` if no server could be started. `gym_error_install` if
+#'   its Python environment could not be installed.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' gym_client()
@@ -33,7 +32,7 @@ session_client <- function(install = TRUE, call = rlang::caller_env()) {
   the_session$client
 }
 
-# One client for all calls, so that they share its connection.
+# One client for all calls, so that they share a connection.
 named_client <- function(url, call = rlang::caller_env()) {
   if (!grepl("^https?://[^/]", url)) {
     gym_abort(
@@ -43,7 +42,7 @@ named_client <- function(url, call = rlang::caller_env()) {
       call = call
     )
   }
-  # It may be the address of a server that this session runs.
+  # The address may be that of a server of this session.
   base <- base_of(url)
   pid <- the_session$servers[[base]]$pid
   names <- list(url, Sys.getenv(token_variable), pid)
@@ -54,8 +53,8 @@ named_client <- function(url, call = rlang::caller_env()) {
   the_session$named_client
 }
 
-# Whether the session has a server or can start one without installing anything. The examples of
-# the help pages ask.
+# Whether the session has a server or can start one without installing anything. For the examples in
+# the help pages.
 can_start_server <- function() {
   tryCatch(
     inherits(session_client(install = FALSE), "GymClient"),

@@ -1,7 +1,6 @@
-# Bundles: what an installation downloads, in a folder that can be carried to a machine without a
-# network.
+# Bundles: everything that an installation downloads, in a folder for machines without a network.
 #
-#   bundle.dcf   the manifest: for which system, lock, extras and Python it was made
+# bundle.dcf the manifest: the system, lock, extras and Python that it is for
 #   SHA256SUMS   all other files with their SHA-256
 #   uv           uv itself (uv.exe)
 #   cache/       uv's cache, with the packages
@@ -9,21 +8,20 @@
 
 #' Fill a folder for installing without a network
 #'
-#' Downloads what [gym_server_install()] would download, so that
-#' `gym_server_install(offline = dir)` can install it on machines without a network: a
-#' classroom's, say. Those need the same kind of system (Windows, macOS or Linux, and the same
+#' Download everything that [gym_server_install()] would download into a folder.
+#' `gym_server_install(offline = dir)` then installs from it on machines without a network, for
+#' example in a classroom. They need the same kind of system (Windows, macOS or Linux, and the same
 #' processor) and the same version of this package.
 #'
-#' The bundle holds uv, the packages in uv's cache, and the archive of the Python that uv
-#' installs. Where that cannot be downloaded the bundle is for the version of the Python that made
-#' it, and the other machines need a Python of that version, too: the function says so.
+#' The bundle contains uv, the packages in uv's cache, and the archive of the Python that uv
+#' installs. If that archive cannot be downloaded, the other machines need a Python of the version
+#' that made the bundle. A message says so.
 #'
-#' @param dir The folder, a string. It is made when it does not exist; an earlier bundle there
-#'   is replaced as soon as the new one is complete, anything else refused.
-#' @param extras The extras that the bundle shall have, as for [gym_server_install()].
+#' @param dir The folder, a string. It is created if it does not exist. An earlier bundle is
+#'   replaced when the new one is complete; a folder with other content is an error.
+#' @param extras The extras in the bundle, as for [gym_server_install()].
 #' @return `dir`, invisibly.
-#' @section Errors: `gym_error_install` when something could not be downloaded, with what to do;
-#'   `gym_error_argument`.
+#' @section Errors: `gym_error_install`, with advice, if a download fails; `gym_error_argument`.
 #' @seealso [gym_server_install()]
 #' @export
 #' @examples
@@ -57,7 +55,7 @@ gym_server_bundle <- function(dir, extras = character()) {
   invisible(dir)
 }
 
-# Where uv gets and puts things while a bundle is made: its downloads end up in the bundle.
+# uv's environment variables while a bundle is made: downloads go into the bundle.
 bundling_source <- function(uv, new, folder) {
   source <- network_source(uv)
   source$env <- c(
@@ -68,7 +66,7 @@ bundling_source <- function(uv, new, folder) {
   source
 }
 
-# Where uv gets and puts things when it installs from a copy of a bundle.
+# uv's environment variables when it installs from a copy of a bundle.
 bundle_source <- function(copy, bundle) {
   list(
     uv = file.path(copy, uv_name()),
@@ -77,13 +75,14 @@ bundle_source <- function(copy, bundle) {
     env = c(
       UV_CACHE_DIR = file.path(copy, "cache"), UV_NO_CACHE = "false",
       UV_PYTHON_CACHE_DIR = file.path(copy, "python"), managed_python_place(),
-      # uv's cache knows a package by its index, which the settings of this machine may not name.
+      # uv's cache identifies a package by its index, so ignore the indexes in this machine's
+      # settings.
       UV_NO_CONFIG = "1", UV_DEFAULT_INDEX = "", UV_INDEX = "", UV_EXTRA_INDEX_URL = ""
     )
   )
 }
 
-# The indexes from which this machine's settings have uv get packages, without passwords.
+# The package indexes in this machine's settings, without passwords.
 index_arguments <- function(source, python) {
   output <- run_tool(source$uv, c(
     "pip", "compile", "--quiet", "--offline", "--no-header", "--emit-index-url",
@@ -93,7 +92,7 @@ index_arguments <- function(source, python) {
   sub("^--index-url", "--default-index", sub("://[^/@]*@", "://", lines))
 }
 
-# An earlier bundle has bundle.dcf, and so has one that was not completed.
+# Incomplete bundles have a bundle.dcf, too.
 check_bundle_place <- function(dir, call) {
   there <- list.files(dir, all.files = TRUE, no.. = TRUE)
   is_bundle <- all(there %in% bundle_parts()) && "bundle.dcf" %in% there
@@ -119,7 +118,7 @@ copy_uv <- function(uv, new, call) {
   }
 }
 
-# uv does without the links in its cache, which most sticks cannot hold.
+# uv works without the links in its cache, which most USB sticks cannot store.
 remove_links <- function(dir) {
   files <- list.files(dir, recursive = TRUE, include.dirs = TRUE, full.names = TRUE)
   links <- files[nzchar(Sys.readlink(files))]
@@ -132,7 +131,7 @@ write_sums <- function(dir) {
   writeLines(paste0(hashes, "  ", files), file.path(dir, "SHA256SUMS"))
 }
 
-# The manifest is complete at the end, when the bundle is.
+# The manifest is written last, so that it marks a complete bundle.
 replace_bundle <- function(new, dir, fields, call) {
   # Again, as the folder may have changed during the download.
   check_bundle_place(dir, call)
@@ -146,7 +145,7 @@ replace_bundle <- function(new, dir, fields, call) {
   write.dcf(fields, manifest)
 }
 
-# Copies the files that a bundle lists, and checks that they arrived as they were put there.
+# Copies the files that a bundle lists and verifies the copies.
 copy_bundle <- function(from, to, call) {
   sums <- readLines(file.path(from, "SHA256SUMS"))
   files <- substring(sums, 67L)
@@ -155,7 +154,7 @@ copy_bundle <- function(from, to, call) {
   }
   suppressWarnings(file.copy(file.path(from, files), file.path(to, files)))
   writeLines(sums, file.path(to, "SHA256SUMS"))
-  # Sticks do not keep which files are programs.
+  # USB sticks do not store execute permissions.
   Sys.chmod(file.path(to, files), "755")
   right <- mapply(has_hash, file.path(to, files), substr(sums, 1L, 64L))
   if (!all(right)) {
@@ -184,12 +183,12 @@ inform_of_bundle <- function(bundle) {
   ))
 }
 
-# Packages for musl differ from those for glibc.
+# Packages for musl and for glibc differ.
 bundle_system <- function() {
   paste0(system_name(), if (startsWith(system_name(), "linux") && has_musl()) "-musl")
 }
 
-# Reads a bundle's manifest and checks that it can be installed here. Nothing is copied.
+# Reads a bundle's manifest and checks that it can be installed here, without copying anything.
 read_bundle <- function(dir, extras, call) {
   dir <- absolute_path(dir)
   fields <- tryCatch(

@@ -1,6 +1,6 @@
-# Making the environment: uv makes it from a Python and installs the packages of the lock files;
-# then a trial, and the manifest at the end. Sessions that install at once use the same folder: uv
-# has one wait for the other, and finds everything there.
+# Making the environment: uv creates it from a Python and installs the packages of the lock files.
+# Then comes a trial run; the manifest is written last. Sessions that install at the same time use
+# the same folder: uv makes one wait for the other, which then finds everything there.
 
 install_environment <- function(plan, call) {
   started <- Sys.time()
@@ -24,11 +24,11 @@ install_environment <- function(plan, call) {
   environment_python(folder)
 }
 
-#' Where uv gets and puts things
+#' Where uv downloads from and writes to
 #' @return A list: `uv`, its path; `python`, the version that it installs; `other_python`, which of
-#'   the machine's Pythons serve where it cannot; `named_python`, the user's choice, `NULL` when
-#'   there is none; `only_python`, the version that the environment must have, `NULL` for any;
-#'   `arguments`, more of them for installing packages; `env`, environment variables.
+#'   the machine's Pythons to use if it cannot; `named_python`, the user's choice, or `NULL`;
+#'   `only_python`, the version that the environment must have, `NULL` for any; `arguments`, further
+#'   ones for installing packages; `env`, environment variables.
 #' @noRd
 network_source <- function(uv) {
   list(
@@ -39,7 +39,7 @@ network_source <- function(uv) {
 
 managed_python_version <- "3.12"
 
-# UV_PYTHON is uv's own variable: a path, or a version.
+# UV_PYTHON is a variable of uv: a path or a version.
 chosen_python <- function() {
   named <- Sys.getenv("UV_PYTHON")
   if (nzchar(named)) named
@@ -52,7 +52,7 @@ make_environment <- function(folder, source, extras, call) {
   install_packages(folder, source, extras, call)
   trial <- try_environment(environment_python(folder), extras)
   if (failed(trial)) {
-    # Files may have been deleted from packages that uv takes for installed.
+    # Files may be missing from packages that uv considers installed.
     install_packages(folder, source, extras, call, "--reinstall")
     trial <- try_environment(environment_python(folder), extras)
   }
@@ -61,9 +61,8 @@ make_environment <- function(folder, source, extras, call) {
   }
 }
 
-# Whether there is an environment whose Python the lock files are for, and which has the version. A
-# Python without pyvenv.cfg would be taken for the one that the environment was made from, and the
-# packages be installed there.
+# Whether there is an environment with a Python that fits the lock files and the version. Without
+# pyvenv.cfg, uv would take this Python for the environment's base and install the packages there.
 has_venv <- function(folder, version = NULL) {
   python <- environment_python(folder)
   about <- if (file.exists(file.path(folder, "venv", "pyvenv.cfg"))) probe_python(python)
@@ -102,7 +101,7 @@ make_venv <- function(folder, source, call) {
   if (!failed(output)) {
     return(invisible())
   }
-  # Many networks block the place where uv gets its own.
+  # Many networks block the server with uv's own Pythons.
   other <- venv("--no-managed-python", "--no-python-downloads", "--python", source$other_python)
   if (failed(other)) {
     abort_tool(
@@ -122,8 +121,8 @@ make_venv <- function(folder, source, call) {
   ))
 }
 
-# uv's Pythons lie beside the environments, so that they are removed together, and on Windows not in
-# a roaming profile.
+# uv's Pythons are beside the environments, so that they are removed together, and on Windows
+# outside the roaming profile.
 managed_python_place <- function() {
   place <- Sys.getenv("UV_PYTHON_INSTALL_DIR")
   c(UV_PYTHON_INSTALL_DIR = if (nzchar(place)) place else managed_python_folder(), not_registered)
@@ -131,12 +130,12 @@ managed_python_place <- function() {
 
 managed_python_folder <- function() file.path(install_root(), "python")
 
-# uv puts no command on the PATH and makes no entry in the registry.
+# Keep uv from adding a command to the PATH or an entry to the registry.
 not_registered <- c(UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0")
 
-# Imports the server as it will be run, looks for the extras' modules, and whether each file that
-# was installed is still there. The exit status alone does not suffice: a Python that is an empty
-# file has the exit status 0, too.
+# Imports the server as it will be run, looks for the extras' modules, and checks that each
+# installed file is still there. The exit status alone is not enough: a Python that is an empty file
+# has the exit status 0, too.
 try_environment <- function(python, extras) {
   modules <- extra_modules[names(extra_modules) %in% extras]
   script <- c(

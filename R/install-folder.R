@@ -1,9 +1,9 @@
-# Where the server's Python environment lies. Each version of the lock files has a folder of its
-# own, so that servers of sessions with another version of the package keep running.
+# The folder of the server's Python environment. Each version of the lock files has its own, so that
+# servers of sessions with another package version keep running.
 #
 #   <cache>/gym/<lock's hash>/venv        the environment
-#                            /installed   its manifest, written when it is complete: the extras;
-#                                         the file's time is that of the last start of a server
+# /installed its manifest, written when it is complete: the extras;
+# the file's time is the last start of a server
 
 install_root <- function() cache_of("gym")
 
@@ -15,7 +15,7 @@ environment_python <- function(folder) {
   file.path(folder, "venv", if (is_windows()) "Scripts/python.exe" else "bin/python")
 }
 
-# The folders of all versions of the package, the one that was used last first.
+# The folders of all versions of the package, last used first.
 install_folders <- function() {
   folders <- list.files(install_root(), "^[0-9a-f]{12}", full.names = TRUE)
   folders[order(last_used(folders), decreasing = TRUE)]
@@ -40,8 +40,8 @@ make_folder <- function(folder, call) {
 }
 
 #' Find the installed environment
-#' @return `NULL`, or a list: `python`, the path of its Python; `folder`, its folder; `extras`,
-#'   the extras that it holds.
+#' @return `NULL`, or a list: `python`, the path of its Python; `folder`; `extras`, those that are
+#'   installed.
 #' @noRd
 installed_server <- function() {
   folder <- environment_folder()
@@ -52,7 +52,7 @@ installed_server <- function() {
   }
 }
 
-# The extras that were installed last, also by an earlier version of the package.
+# The extras of the last installation, also by an earlier version of the package.
 earlier_extras <- function() {
   for (folder in c(environment_folder(), install_folders())) {
     extras <- read_extras(folder)
@@ -63,7 +63,7 @@ earlier_extras <- function() {
   character()
 }
 
-# NULL for a folder that is not complete.
+# NULL for an incomplete folder.
 read_extras <- function(folder) {
   path <- file.path(folder, "installed")
   fields <- if (file.exists(path)) tryCatch(read.dcf(path)[1L, ], error = function(cnd) NULL)
@@ -90,17 +90,17 @@ is_installed_python <- function(python) {
   !is.null(python) && startsWith(python, paste0(install_root(), "/"))
 }
 
-# Before a server starts, so that what it runs from is not removed as unused.
+# Called before a server starts, so that its environment is not removed as unused.
 use_python <- function(python) {
   if (is_installed_python(python)) {
     manifest <- file.path(dirname(dirname(dirname(python))), "installed")
-    # Another user's environment is not this session's to keep.
+    # Changing the time fails in another user's environment.
     suppressWarnings(Sys.setFileTime(manifest, Sys.time()))
   }
 }
 
-# Servers of other sessions, also on other machines with the same home, may run from what another
-# version of the package installed. A session that was killed may have left a copy or a download.
+# Servers of other sessions, also on other machines with the same home, may run from another
+# version's environment. A killed session may have left a copy or a download.
 remove_old_folders <- function(days = 30) {
   folders <- list.files(install_root(), "^([0-9a-f]{12}|bundle-|download-)", full.names = TRUE)
   others <- setdiff(folders, environment_folder())

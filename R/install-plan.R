@@ -1,15 +1,13 @@
-# Planning an installation, and what the user is told and asked before it: with which uv, how many
-# megabytes, where.
+# Plan an installation, and ask the user first: which uv, how many megabytes, where.
 
 #' Plan an installation
 #'
-#' Nothing is changed and nothing downloaded.
+#' Nothing is changed or downloaded.
 #' @param extras All extras that the environment will hold.
-#' @param bundle What read_bundle() returns, `NULL` when the network is used.
-#' @return A list: `extras`; `bundle`; `uv`, the path of the uv found, `NULL` when the bundle's is
-#'   used or uv is downloaded first; `new_python`, whether uv installs one; `megabytes`, about how
-#'   much is downloaded and how much it takes on the disk, a numeric vector with the names
-#'   `download` and `disk`.
+#' @param bundle The result of read_bundle(), `NULL` to use the network.
+#' @return A list: `extras`; `bundle`; `uv`, the path of the uv found, `NULL` to use the bundle's or
+#'   to download it first; `new_python`, whether uv installs one; `megabytes`, the approximate sizes
+#'   of the download and on the disk, a numeric vector with the names `download` and `disk`.
 #' @noRd
 install_plan <- function(extras = character(), bundle = NULL, call = rlang::caller_env()) {
   uv <- if (is.null(bundle)) find_uv(call)
@@ -26,8 +24,8 @@ install_plan <- function(extras = character(), bundle = NULL, call = rlang::call
   list(extras = extras, bundle = bundle, uv = uv, new_python = new_python, megabytes = megabytes)
 }
 
-# Approximate sizes on Linux with an Intel processor: of the Python that uv installs, and of the uv
-# that R/install-uv.R names.
+# Approximate sizes on Linux with an Intel processor: the Python that uv installs, and the uv named
+# in R/install-uv.R.
 managed_python_megabytes <- c(download = 35, disk = 110)
 uv_megabytes <- c(download = 20, disk = 40)
 

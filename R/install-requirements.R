@@ -1,6 +1,5 @@
-# What is installed: the lock files of the server's Python packages, which are part of this package
-# and written by tools/lock. base.txt lists what the server itself needs, EXTRA.txt what an extra
-# adds.
+# The lock files of the server's Python packages, which are part of this package and written by
+# tools/lock. base.txt lists the server's own packages, EXTRA.txt those of an extra.
 
 server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video")
 
@@ -12,7 +11,7 @@ lock_files <- function(extras) {
   vapply(c("base", extras), lock_file, "", USE.NAMES = FALSE)
 }
 
-# Identifies the lock files. The ends of lines do not count, which git and zip programs may change.
+# Identifies the lock files. Line endings are ignored, because git and zip programs may change them.
 lock_hash <- function() {
   lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
   substr(hex(openssl::sha256(charToRaw(paste(lines, collapse = "\n")))), 1L, 12L)

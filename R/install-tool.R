@@ -1,12 +1,11 @@
-# Running uv and Python: their output goes into a log, and a failure becomes an error that says what
-# to do.
+# Run uv and Python. Their output goes into a log; a failure becomes an error with advice.
 
 abort_install <- function(message, ..., call = rlang::caller_env()) {
   gym_abort(message, class = "gym_error_install", ..., call = call)
 }
 
-# The environment variables of a tool: without other Pythons' settings, and without the folders of
-# libraries that R puts in front.
+# The environment variables of a tool, without settings of other Pythons and without the library
+# folders that R adds.
 tool_environment <- function(more = character()) {
   own <- c(
     PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "",
@@ -29,10 +28,10 @@ run_tool <- function(command, arguments, env = character()) {
     processx::run(
       command, arguments,
       error_on_status = FALSE, stderr_to_stdout = TRUE, env = tool_environment(env),
-      # Not the session's working directory, where a project may have settings for uv.
+      # Not the working directory, where a project may have settings for uv.
       wd = install_root(), cleanup_tree = TRUE, windows_hide_window = TRUE,
       stdout_line_callback = function(line, process) write_log(line),
-      # Shows that something is going on.
+      # Shows that the program is busy.
       spinner = cli::is_dynamic_tty()
     ),
     error = function(cnd) {
@@ -45,10 +44,10 @@ run_tool <- function(command, arguments, env = character()) {
 
 failed <- function(output) !identical(attr(output, "status"), 0L)
 
-# The address of a mirror or a proxy may hold a password.
+# The address of a mirror or a proxy may contain a password.
 without_passwords <- function(texts) gsub("://[^/[:space:]]+@", "://<login>@", texts)
 
-# Errors are ignored: on a full disk the error of the installation itself says more.
+# Errors are ignored: on a full disk, the installation's own error says more.
 write_log <- function(lines) {
   lines <- without_passwords(lines)
   try(suppressWarnings(cat(paste0(lines, "\n"), file = install_log(), append = TRUE, sep = "")),
@@ -71,7 +70,7 @@ abort_tool <- function(what, output, call, more = NULL) {
   )
 }
 
-# The lines that name an error and what follows them; the last lines where there is none.
+# The lines of an error message, or the last lines if there is none.
 error_lines <- function(output, n = 6L) {
   lines <- trimws(output[nzchar(trimws(output))])
   begins <- grep("^error\\b", lines, ignore.case = TRUE)
@@ -81,8 +80,8 @@ error_lines <- function(output, n = 6L) {
   utils::tail(lines, n)
 }
 
-# What to do about a failure, which is known by the messages of uv and the system. The first
-# entry of `failures` that fits counts.
+# Advice on a failure, recognised by the messages of uv and the system. The first entry of
+# `failures` that matches is used.
 install_advice <- function(output) {
   text <- paste(output, collapse = "\n")
   for (kind in failures) {

@@ -1,14 +1,14 @@
-# Finding uv, <https://docs.astral.sh/uv/>, and downloading it where there is none.
+# Find uv, <https://docs.astral.sh/uv/>, or download it.
 
 uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 
-# The oldest version that has --managed-python and was tried.
+# The oldest version with --managed-python that was tested.
 least_uv <- "0.7.0"
 
 #' Find uv
-#' @param within Seconds in which all candidates must have answered, each in its share of them;
-#'   `NULL` gives each the time that a program may take on a busy machine.
-#' @return The path of the first that runs and is new enough; `NULL` when there is none.
+#' @param within The time in which all candidates must answer, in seconds, shared equally. `NULL`
+#'   gives each the time that a program may take on a busy machine.
+#' @return The path of the first one that runs and is new enough, or `NULL`.
 #' @noRd
 find_uv <- function(call = rlang::caller_env(), within = NULL) {
   named <- Sys.getenv("GYM_UV")
@@ -36,7 +36,7 @@ uv_candidates <- function() {
   reticulate <- Sys.getenv("RETICULATE_UV")
   home <- if (is_windows()) Sys.getenv("USERPROFILE") else path.expand("~")
   places <- c(
-    # For reticulate "managed" stands for its own uv.
+    # For reticulate, "managed" means its own uv.
     if (nzchar(reticulate) && reticulate != "managed") absolute_path(reticulate),
     unname(Sys.which("uv")),
     file.path(home, ".local", "bin", uv_name()),
@@ -52,9 +52,9 @@ uv_works <- function(uv, timeout = 30) {
   startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
-# The release that is downloaded where there is no uv, and the SHA-256 of its archives, as published
-# with it and kept by the makers of uv: github.com/astral-sh/setup-uv, in the folder
-# src/download/checksum the file known-checksums.json.
+# The release to download if there is no uv, and the SHA-256 of its archives, as published with it
+# and kept by uv's makers in github.com/astral-sh/setup-uv,
+# src/download/checksum/known-checksums.json.
 uv_release <- list(
   version = "0.12.16",
   checksums = c(
@@ -77,7 +77,7 @@ uv_release <- list(
   )
 )
 
-# The name that uv's releases give this system.
+# The name of this system in uv's releases.
 uv_target <- function() {
   parts <- strsplit(system_name(), "-", fixed = TRUE)[[1L]]
   processor <- sub("arm64", "aarch64", parts[[2L]], fixed = TRUE)
@@ -91,11 +91,10 @@ uv_target <- function() {
 
 has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 
-# Where the downloaded uv is put.
 pinned_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Downloads uv. The archive is unpacked only when its checksum is right. UV_DOWNLOAD_URL is a
-# variable of uv's own installer.
+# Downloads uv and unpacks the archive if its checksum is right. UV_DOWNLOAD_URL is a variable of
+# uv's own installer.
 install_uv <- function(call) {
   target <- uv_target()
   if (!target %in% names(uv_release$checksums)) {
@@ -104,7 +103,7 @@ install_uv <- function(call) {
       call = call
     )
   }
-  # A folder of its own, as another session may download uv, too.
+  # A folder of its own, because another session may download uv, too.
   place <- tempfile("download-", install_root())
   dir.create(place, recursive = TRUE, showWarnings = FALSE)
   on.exit(unlink(place, recursive = TRUE))
@@ -119,7 +118,7 @@ install_uv <- function(call) {
   unpack_uv(archive, call)
 }
 
-# What helps where uv cannot be had.
+# Advice if uv is not available.
 without_uv <- function() {
   paste(
     "Without uv, install the packages into a Python 3.10 to 3.13 by other means, in a terminal",
@@ -129,7 +128,7 @@ without_uv <- function() {
   )
 }
 
-# Five times as much as its archive has.
+# Five times the size of its archive.
 most_bytes_of_uv <- 100e6
 
 download_uv <- function(url, archive, call) {
@@ -137,7 +136,7 @@ download_uv <- function(url, archive, call) {
   handle <- curl::new_handle()
   set_curl(
     handle, failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
-    # Fewer bytes than this in a second, for so many seconds, end a download that has stopped.
+    # A download ends if it stays below this many bytes per second for so many seconds.
     low_speed_limit = 100, low_speed_time = 60
   )
   certificates <- Sys.getenv("SSL_CERT_FILE")
@@ -171,7 +170,7 @@ download_uv <- function(url, archive, call) {
   )
 }
 
-# The file is opened as "rb": otherwise R would decompress it, and hash its content.
+# Open the file as "rb": otherwise R would decompress it and hash its content.
 file_sha256 <- function(path) {
   bytes <- file(path, "rb")
   on.exit(close(bytes))

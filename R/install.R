@@ -1,41 +1,38 @@
-#' Install what the server needs
+#' Install the server's Python environment
 #'
-#' Makes a Python environment for the server that comes with this package, so that nobody needs
-#' to know Python. It holds exact versions that were tried together, each file checked by its
-#' hash; nothing is compiled, and no other Python on the machine is changed.
+#' Make a Python environment for the server that comes with this package. You do not need to know
+#' Python. The environment has exact package versions that were tested together, and each file is
+#' checked by its hash. Nothing is compiled, and no other Python on the machine is changed.
 #'
-#' [uv](https://docs.astral.sh/uv/) does the work where it is found: the program that the
-#' environment variable `GYM_UV` or `RETICULATE_UV` names, one on the `PATH`, in `~/.local/bin`
-#' or the one that reticulate installed. Where there is none it is downloaded first, a release that
-#' this package names, checked by its hash. uv also installs a Python of its own; where the network
-#' does not let that through, a Python 3.10 to 3.13 on the machine is taken. uv's variable
-#' `UV_PYTHON` names another one, by its path or version. Where uv cannot be had, install the
-#' packages into a Python by any other means, and have `GYM_PYTHON` name it: see
+#' The program [uv](https://docs.astral.sh/uv/) does the work. It is looked for in the environment
+#' variables `GYM_UV` and `RETICULATE_UV`, on the `PATH`, in `~/.local/bin` and in reticulate's
+#' folder. If there is none, a fixed release is downloaded and checked by its hash. uv also installs
+#' its own Python. If the network blocks that, a Python 3.10 to 3.13 on the machine is used. uv's
+#' variable `UV_PYTHON` selects another one, by its path or version. If uv is not available, install
+#' the packages into a Python by other means and set `GYM_PYTHON` to its path: see
 #' `vignette("server")`.
 #'
-#' The environment lies in `tools::R_user_dir("gym", "cache")`. [gym_client()] finds it there.
-#' Extras that were installed before are kept, and servers that run from there find new ones. A
-#' call that finds everything there checks it, says so and changes nothing; what was damaged is
-#' made anew.
+#' The environment is in `tools::R_user_dir("gym", "cache")`, where [gym_client()] finds it. Extras
+#' that were installed before are kept. Running servers find new extras. If everything is installed
+#' already, the call checks it and says so. It repairs a damaged environment.
 #'
-#' Environment variables change where things come from and go, set by [Sys.setenv()] or in
-#' `~/.Renviron`: `R_USER_CACHE_DIR` is the place of the cache folder; `HTTPS_PROXY` the
-#' network's proxy; `SSL_CERT_FILE` the file of its certificates; `UV_PYTHON_INSTALL_MIRROR`
-#' where uv gets its Pythons, and `UV_DOWNLOAD_URL` where uv itself is downloaded from. uv goes by
-#' its own settings, such as those of an institution's mirror.
+#' Set these environment variables by [Sys.setenv()] or in `~/.Renviron` to change sources and
+#' targets: `R_USER_CACHE_DIR` is the cache folder, `HTTPS_PROXY` the network's proxy,
+#' `SSL_CERT_FILE` the file of its certificates, `UV_PYTHON_INSTALL_MIRROR` the source of Pythons,
+#' and `UV_DOWNLOAD_URL` the source of uv. uv also uses its own settings, such as those for an
+#' institution's mirror.
 #'
-#' @param extras What to install beside the server, a character vector with any of
-#'   `"toy-text"`, `"box2d"`, `"mujoco"`, `"atari"` and `"video"`; the default is none. The
-#'   environments of classic control and toy text need none.
+#' @param extras Extras to install, a character vector of `"toy-text"`, `"box2d"`, `"mujoco"`,
+#'   `"atari"` and `"video"`. The default is none. Classic control and toy text work without extras.
 #' @param ... Must be empty.
-#' @param offline A folder that [gym_server_bundle()] filled on another machine, a string: the
-#'   network is not used. `NULL`, the default, installs from the network.
-#' @param ask Whether to ask first, saying what, how many megabytes and where; by default
-#'   `TRUE` in an interactive session. In a script the call is consent.
-#' @return The path of the environment's Python, a string, invisibly; `NULL`, invisibly, when
-#'   the answer was no.
-#' @section Errors: `gym_error_install` when it did not succeed, with what to do; whatever was
-#'   installed before is still there. `gym_error_argument`.
+#' @param offline A folder filled by [gym_server_bundle()] on another machine, a string, to install
+#'   without the network. `NULL`, the default, installs from the network.
+#' @param ask Ask first, showing the packages, the megabytes and the folder? By default `TRUE` in an
+#'   interactive session. In a script the call itself is consent.
+#' @return The path of the environment's Python, a string, invisibly. `NULL`, invisibly, if the
+#'   answer was no.
+#' @section Errors: `gym_error_install`, with advice, if the installation failed; an earlier
+#'   installation is kept. `gym_error_argument`.
 #' @seealso [gym_server_bundle()], [gym_client()]
 #' @export
 #' @examples
@@ -50,7 +47,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   call <- rlang::current_env()
   check_named_python(call)
   wanted <- server_extras[server_extras %in% c(extras, earlier_extras())]
-  # A bundle that does not fit is an error also when it is not needed.
+  # A bundle that does not fit is an error even if it is not needed.
   bundle <- if (!is.null(offline)) read_bundle(offline, wanted, call)
   there <- installed_server()
   if (has_all(there, wanted)) {
@@ -74,12 +71,12 @@ with_interrupt_message <- function(code) {
   })
 }
 
-# Whether an environment has the extras, and its server can really be imported.
+# Whether an environment has the extras and its server can be imported.
 has_all <- function(there, extras) {
   !is.null(there) && all(extras %in% there$extras) && !failed(try_environment(there$python, extras))
 }
 
-# The Python that GYM_PYTHON names is used before an installed one: if it cannot run the server, an
+# The Python in GYM_PYTHON is used before an installed one: if it cannot run the server, an
 # installation would not help.
 check_named_python <- function(call) {
   named <- Sys.getenv("GYM_PYTHON")
@@ -102,8 +99,8 @@ check_named_python <- function(call) {
   )
 }
 
-# Asks a Python for its version, and whether the lock files are for it. Returns NULL for a Python
-# that does not run.
+# Asks a Python for its version and checks it against the lock files. Returns NULL for a Python that
+# does not run.
 probe_python <- function(python) {
   output <- run_quietly(
     python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
@@ -120,7 +117,7 @@ probe_python <- function(python) {
   )
 }
 
-# What probe_python() runs. It is run with -I, which every Python that the server can use knows.
+# The code for probe_python(). Run it with -I, which every Python that the server supports has.
 probe <- paste(
   "import platform, sys",
   "print('python', '%d.%d' % sys.version_info[:2], platform.python_implementation(),",
@@ -128,7 +125,7 @@ probe <- paste(
   sep = "\n"
 )
 
-# Says what keeps this session from using what was installed.
+# Warns if this session will not use the new installation.
 inform_of_precedence <- function(python) {
   named <- Sys.getenv("GYM_PYTHON")
   if (nzchar(named) && !identical(path.expand(named), python)) {
@@ -139,11 +136,11 @@ inform_of_precedence <- function(python) {
   }
 }
 
-#' Install the server's Python environment if somebody agrees
+#' Install the server's Python environment if the user agrees
 #'
-#' Either beforehand, by the environment variable GYM_INSTALL, or now, when asked. A session that
+#' The user agrees by the environment variable GYM_INSTALL, or when asked now. A session that
 #' declined is not asked again.
-#' @return The path of the environment's Python, `NULL` when nobody agreed.
+#' @return The path of the environment's Python, or `NULL` without consent.
 #' @noRd
 prompt_for_python <- function() {
   if (lower_case(Sys.getenv("GYM_INSTALL")) %in% c("1", "true", "yes")) {
@@ -152,7 +149,7 @@ prompt_for_python <- function() {
   if (!rlang::is_interactive() || isTRUE(the_session$install_declined)) {
     return(NULL)
   }
-  # Processes get names that are drawn from R's generator.
+  # Process names are drawn from R's generator.
   python <- keep_random_state(gym_server_install(ask = TRUE))
   the_session$install_declined <- is.null(python)
   python

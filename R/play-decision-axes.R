@@ -1,5 +1,5 @@
-# What a decision map shows of an observation: its axes, their ranges, the values at which the other
-# parts are held, and the path of an episode.
+# The parts of an observation in a decision map: the axes, their ranges, the values of the other
+# parts, and the path of an episode.
 
 # A list: the names of the numbers of an observation, their bounds and usual ranges.
 mapped_observation <- function(place, call = rlang::caller_env()) {
@@ -28,8 +28,8 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   )
 }
 
-# How far each part goes from the middle to either side: a position to where an episode ends, a
-# speed as fast as it gets. NULL where that is not known of all parts.
+# How far each part goes from the middle to either side: a position to the end of an episode, a
+# speed to its usual maximum. NULL if that is not known for all parts.
 usual_ranges <- function(env_id, names) {
   family <- environment_family(env_id)
   limits <- lapply(episode_limits[[family, exact = TRUE]], function(limit) max(limit$at))
@@ -169,7 +169,7 @@ path_points <- function(path, names, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "path", value = path, call = call
     )
   }
-  # Each candidate's episodes are counted apart.
+  # Each candidate's episodes are numbered from 1.
   episode <- paste(path$candidate %||% 1L, path$episode %||% 1L)
   data.frame(
     episode = match(episode, unique(episode)), x = path[[names[[1L]]]], y = path[[names[[2L]]]]

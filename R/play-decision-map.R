@@ -1,79 +1,72 @@
 #' Map what a policy does
 #'
-#' Asks a policy what it does on a grid over two parts of the observation, the others held
-#' where they are put. [plot()][plot.gym_decision_map()] shows it. Nothing is played, unless
+#' Ask a policy for its actions on a grid over two parts of the observation, with the other parts
+#' held constant. [plot()][plot.gym_decision_map()] shows the map. Nothing is played, unless
 #' `path = TRUE`.
 #'
 #' # What is shown
 #'
-#' - A network with one output and two actions: the output, scaled to the range from 0 to
-#'   1, which is rounded to the action; the border between the actions is at one half.
+#' - A network with one output and two actions: the output, scaled to the range from 0 to 1. The
+#'   action changes at one half.
 #' - A network with the output `"softmax"` and two actions: the probability of the second one.
-#' - Any other policy with discrete actions: the action that is taken. A function is asked
-#'   as in [act()]; of a network that draws it is the most likely one.
-#' - Actions that are a Box: the action, or of several numbers the one named by `action`.
+#' - Any other policy with discrete actions: the action. A function is called as in [act()]. A
+#'   network that draws its actions shows the most likely one.
+#' - Actions that are a Box: the action, or, of several numbers, the one selected by `action`.
 #'
-#' Where observations are Discrete the map has the action in each state, and the other arguments
-#' make no difference. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake,
-#' CliffWalking or Taxi.
+#' For Discrete observations the map has the action in each state, and the other arguments are
+#' ignored. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake, CliffWalking or Taxi.
 #'
-#' Where observations have several parts with few values each, as those of Blackjack, the map has
-#' the action in each state, and of a table its value; `x` and `y` are the first two parts unless
-#' others are named, `at` holds a part still, and each value of any other part has a panel of its
-#' own: `plot(decision_map("Blackjack-v1", policy, "dealer_card", "player_sum"))`.
+#' If observations have several parts with few values each, like Blackjack's, the map has the action
+#' in each state, and its value if the policy is a table. `x` and `y` are the first two parts by
+#' default. `at` holds a part constant, and each value of any other part has its own panel:
+#' `plot(decision_map("Blackjack-v1", policy, "dealer_card", "player_sum"))`.
 #'
 #' # Ranges
 #'
-#' `xlim` and `ylim` where they are given. Otherwise CartPole's parts have the ranges in
-#' which an episode goes on, velocities those that balanced and falling poles reach; other
-#' parts have their bounds in the observation space, and those without bounds need a path,
-#' whose range is taken.
+#' `xlim` and `ylim` set the ranges. By default, CartPole's positions have the range in which an
+#' episode goes on, and its velocities the range of balanced and falling poles. Other parts have
+#' their bounds in the observation space. Parts without bounds need a path, whose range is used.
 #'
-#' @param env The environment, by which observations have names and actions a meaning: an id,
-#'   such as `"CartPole-v1"`, what [gym_wrap()] returns, or an environment made by
-#'   [gym_make()], which is not touched. `NULL`, the default, for a network that was played
-#'   already, or whose inputs may be named `obs_1`, `obs_2`, ...
+#' @param env The environment, which supplies the names of observations and the meanings of actions:
+#'   an id, such as `"CartPole-v1"`, the result of [gym_wrap()], or an environment made by
+#'   [gym_make()], which is not changed. `NULL`, the default, for a network that was played before,
+#'   or whose inputs may be named `obs_1`, `obs_2`, ...
 #' @param policy The policy: a network, made by [policy_network()] or found by a search, or a
 #'   function of many observations as for [rollout()].
-#' @param x,y The two parts of the observation to map: their names, such as
-#'   `"pole_angle"`, or numbers, the first being 1. Needed unless there are just two.
-#' @param at Where the other parts are held: a numeric vector with their names, such as
-#'   `c(cart_position = 1)`. Those not named, by default all, are held at 0, or where 0 is
-#'   out of their bounds in the middle.
-#' @param path Episodes to show on the map: what [rollout()] returned with `steps = TRUE`, or
-#'   a data frame of steps like its own; `TRUE` to play one episode of the policy in `env`;
-#'   `NULL`, the default, for none. On its way also the other parts change, which the map
-#'   holds still.
+#' @param x,y The two parts of the observation to map: their names, such as `"pole_angle"`, or
+#'   numbers from 1. Required if there are more than two.
+#' @param at The values of the other parts: a numeric vector with their names, such as
+#'   `c(cart_position = 1)`. By default a part is 0, or the middle of its bounds if these exclude 0.
+#' @param path Episodes to show on the map: the result of [rollout()] with `steps = TRUE`, or a data
+#'   frame of steps like its own; `TRUE` to play one episode of the policy in `env`; `NULL`, the
+#'   default, for none. Along the path the other parts change, too; the map holds them constant.
 #' @param xlim,ylim The ranges, numeric vectors of length 2, or `NULL`, the default.
-#' @param action Which number of an action that is a Box of several to map, a whole number
-#'   from 1, the default.
-#' @param size How many points the grid has in each direction, a whole number of at least 2;
-#'   the default is 101.
+#' @param action The number to map of an action that is a Box of several, a whole number from 1, the
+#'   default.
+#' @param size The number of points in each direction, a whole number of at least 2. The default
+#'   is 101.
 #' @param seed A whole number that fixes the episode played with `path = TRUE` and leaves the
-#'   session's generator as it was, or `NULL`, the default, to draw from the session's
-#'   generator.
-#' @param client The client of the server that is asked about an environment named by its id;
-#'   the default is the session's own, [gym_client()].
-#' @return An object of class `gym_decision_map`, which [print()], [as.data.frame()] and
-#'   [plot()][plot.gym_decision_map()] know; a list with the elements
+#'   session's generator as it was. `NULL`, the default, draws a seed from the session's generator.
+#' @param client The client of the server that is asked about an environment given by its id. The
+#'   default is the session's client, [gym_client()].
+#' @return An object of class `gym_decision_map`, with methods for [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_decision_map()]. It is a list with the elements
 #'   \describe{
-#'     \item{grid}{A data frame with one row for each point: the two parts, under their
-#'       names, and `output` (double, from 0 to 1, where `kind` is `"output"`) or `action`
-#'       (integer or double). `as.data.frame()` gives it.}
-#'     \item{x, y}{The names of the two parts, strings.}
-#'     \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"`, `"state"` or
-#'       `"parts"`. A map of parts has `panels`, too, the names of the parts on no axis.}
-#'     \item{at}{Where the other parts are held, a named numeric vector.}
-#'     \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
-#'     \item{actions}{The names of the actions, strings; of a Box the name of the number.}
-#'     \item{limits}{The bounds of an action that is a Box, otherwise `NULL`.}
-#'     \item{env_id, policy}{The environment's id, `NULL` where it is unknown, and the
-#'       policy.}
+#'   \item{grid}{A data frame with one row for each point: the two parts, under their names, and
+#'   `output` (double, from 0 to 1, if `kind` is `"output"`) or `action` (integer or double).
+#'   `as.data.frame()` returns it.}
+#'   \item{x, y}{The names of the two parts, strings.}
+#'   \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"`, `"state"` or
+#'   `"parts"`. A map of parts also has `panels`, the names of the parts on no axis.}
+#'   \item{at}{The values of the other parts, a named numeric vector.}
+#'   \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
+#'   \item{actions}{The names of the actions, strings; for a Box the name of the number.}
+#'   \item{limits}{The bounds of an action that is a Box, otherwise `NULL`.}
+#'   \item{env_id, policy}{The environment's id, `NULL` if it is unknown, and the policy.}
 #'   }
-#' @section Errors: `gym_error_argument` when there is nothing to map (a policy that draws its
-#'   actions, observations that are not at least two numbers, actions that are neither
-#'   discrete nor a Box), a name is none of the observation's, or a range is neither known
-#'   nor given.
+#' @section Errors: `gym_error_argument` if there is nothing to map (a policy that draws its
+#'   actions, observations that are not at least two numbers, actions that are neither discrete nor
+#'   a Box), for a name that the observation does not have, or for an unknown range.
 #' @references CartPole's ranges: an episode ends beyond 2.4 in position and 12 degrees in angle,
 #'   see <https://gymnasium.farama.org/environments/classic_control/cart_pole/>.
 #' @export
@@ -148,7 +141,7 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   )
 }
 
-# Several numbers, each of which has few values, as those of Blackjack.
+# Several numbers with few values each, like Blackjack's.
 is_counted_parts <- function(space) {
   !is.null(space) && !is.null(space_index(space)) && length(digit_values(space)) > 1L
 }
@@ -171,9 +164,9 @@ check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
 
 # The environment ------------------------------------------------------------------
 
-#' Find out where a policy decides
-#' @return A list: `policy`, bound where that is possible, `observation_space`,
-#'   `action_space`, `env_id`, each `NULL` where it is unknown.
+#' Find out where a policy acts
+#' @return A list: `policy`, bound if possible, `observation_space`, `action_space`, `env_id`, each
+#'   `NULL` if it is unknown.
 #' @noRd
 mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
   if (!is.null(env)) {
@@ -198,7 +191,7 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
 
 # The actions ----------------------------------------------------------------------
 
-#' Ask a policy for its decisions on many observations
+#' Ask a policy for its actions on many observations
 #' @param values A matrix with an observation in each row.
 #' @return A list: `kind`, `values`, `actions`, `limits`, as [decision_map()] describes them.
 #' @noRd
@@ -220,7 +213,7 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
   decide_action(place, values, outputs)
 }
 
-# One of some actions; where a single output chooses between two and has a range, the output.
+# A discrete action; or the output, if a single bounded output chooses between two actions.
 decide_action <- function(place, values, outputs) {
   space <- place$action_space
   n <- space$n %||% max(2L, ncol(outputs))
@@ -249,7 +242,7 @@ decide_value <- function(place, values, outputs, action, call) {
   )
 }
 
-# A function is called as it is while it plays.
+# A function is called as in a rollout.
 policy_actions <- function(place, values, outputs) {
   if (!is.null(outputs)) {
     return(network_action(place$action_space, outputs, greedy_policy(place$policy), one = FALSE))

@@ -1,5 +1,5 @@
-# The decision map of a policy that observes the number of a state, or several such numbers: what it
-# does in each of them.
+# The decision map of a policy that observes the number of a state, or several such numbers: its
+# action in each of them.
 
 check_discrete_actions <- function(place, call) {
   if (!inherits(place$action_space, "gym_space_discrete")) {
@@ -26,10 +26,10 @@ new_state_map <- function(place, call) {
   )
 }
 
-#' Map what a policy does where observations have several parts, each with few values
+#' Map a policy whose observations have several parts with few values each
 #'
 #' @param x,y,xlim,ylim,at As for [decision_map()].
-#' @return As [decision_map()]; `panels` are the names of the parts that are on no axis.
+#' @return As [decision_map()]; `panels` are the names of the parts on no axis.
 #' @noRd
 new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   space <- place$observation_space

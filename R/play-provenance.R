@@ -1,5 +1,4 @@
-# Where a result comes from: what must be known to get it again, or to see why it came out
-# otherwise.
+# How a result was made: what you need to get it again, or to see why another one differs.
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()

@@ -1,18 +1,19 @@
-#' Plot how bandits were learned
+#' Plot what bandit learners achieved
 #'
-#' Shows the mean reward of all learners, or how many of them took the best arm, step by step.
-#' Several given together are compared in one picture.
+#' Show the mean reward of all learners, or the share that took the best arm, at each step. Several
+#' results are compared in one picture.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object What [learn_bandit()] returned.
-#' @param ... More of them, which may have names for the key. Further arguments of `plot()` are
-#'   those of `autoplot()`.
-#' @param what What is shown, a string: `"mean_reward"`, the default, or `"best_share"`.
+#' @param x,object The result of [learn_bandit()].
+#' @param ... Further results, optionally with names for the key. `plot()` passes its arguments to
+#'   `autoplot()`.
+#' @param what What to show, a string: `"mean_reward"`, the default, or `"best_share"`.
+#' @param main The title. `NULL`, the default, names the bandit.
 #' @param main The title; `NULL`, the default, names the bandit.
-#' @return A ggplot; of `plot()` invisibly.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_bandit_learning
 #' @exportS3Method ggplot2::autoplot
 #' @examples

@@ -1,4 +1,4 @@
-# Several policies in one picture: a row for each, with the distribution of its returns.
+# Several policies in one picture: a row for each with the distribution of its returns.
 
 # More rows than this could not be told apart.
 most_rows <- 10L
@@ -27,7 +27,7 @@ comparison_picture <- function(rollouts) {
     ggplot2::scale_fill_manual(
       values = named_colours(rows$label), aesthetics = c("fill", "colour"), guide = "none"
     ) +
-    # The medians stand at the right side, where they cannot run into one another.
+    # The medians are at the right side, where they cannot overlap.
     ggplot2::scale_y_continuous(
       breaks = rows$y, labels = vapply(as.character(rows$label), broken_text, "", width = 20),
       sec.axis = ggplot2::dup_axis(labels = paste("median", number_text_each(rows$median)))
@@ -37,11 +37,11 @@ comparison_picture <- function(rollouts) {
     ggplot2::theme(axis.title.y.right = ggplot2::element_blank())
 }
 
-#' Compute what a plot of several policies shows
+#' Compute the data of a plot of several policies
 #' @param rollouts A list of rollouts with names.
-#' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `y`
-#'   (where its row stands), `median`; `returns`, `shapes`, data frames with a column `label`: the
-#'   returns (`value`), and the corners of the areas (`x`, `y`, and `area`, which tells them apart);
+#' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `y` (the
+#'   place of the row), `median`; `returns`, `shapes`, data frames with a column `label`: the
+#'   returns (`value`), and the corners of the areas (`x`, `y`, and `area`, the number of the area);
 #'   `title`, `subtitle`.
 #' @noRd
 comparison_plot_data <- function(rollouts) {
@@ -51,7 +51,7 @@ comparison_plot_data <- function(rollouts) {
   each <- lapply(shown, returns_plot_data)
   bars <- equal_bars(lapply(each, function(data) data$bars), range(unlist(shown)))
   y <- rev(seq_along(shown)) - 1
-  # In the order of the rows, as their colours are.
+  # In the order of the rows, which is that of the colours.
   label <- factor(names(shown), names(shown))
   counts <- unique(range(lengths(shown)))
   list(
@@ -73,8 +73,9 @@ comparison_plot_data <- function(rollouts) {
   )
 }
 
-#' Take the returns of a rollout apart by candidate
-#' @param label The rollout's name; `several`, whether there are other rollouts.
+#' Split the returns of a rollout by candidate
+#' @param label The rollout's name.
+#' @param several Whether there are other rollouts.
 #' @return A list of numeric vectors with names.
 #' @noRd
 candidate_returns <- function(x, label, several) {
@@ -87,7 +88,7 @@ candidate_returns <- function(x, label, several) {
   stats::setNames(each, if (several) paste(label, names) else names)
 }
 
-# All of few, otherwise those with the highest mean returns.
+# All groups, or of many those with the highest mean returns.
 shown_groups <- function(groups) {
   if (length(groups) <= most_rows) {
     return(groups)
@@ -95,7 +96,7 @@ shown_groups <- function(groups) {
   groups[order(-vapply(groups, mean, 0))[seq_len(most_rows)]]
 }
 
-# The bars of all rows are equally wide: as the two nearest values of all allow.
+# The bars of all rows have the same width, which the two nearest values determine.
 equal_bars <- function(each, across) {
   values <- unique(unlist(lapply(each, function(bars) bars$value)))
   half <- if (length(values)) bar_half(values, diff(across))
@@ -108,8 +109,7 @@ equal_bars <- function(each, across) {
   })
 }
 
-# The areas of a row: one under a density, or one for each bar. The highest point of each row is as
-# high as that of every other.
+# The areas of a row: one below a density, or one for each bar. All rows have the same height.
 row_shapes <- function(label, y, data, bars) {
   height <- 0.75
   if (is.null(bars)) {

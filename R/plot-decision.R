@@ -1,20 +1,19 @@
 #' Plot a decision map
 #'
-#' Shows what a policy does over two parts of the observation: by colour the output of a
-#' network that is rounded to one of two actions, with a line where it is one half; the
-#' action that is taken; or the value of an action that is a Box, with a line at the middle
-#' of its bounds. Regions have the names of their actions. The path of an episode begins at
-#' the ring and ends at the cross.
+#' Show the actions of a policy over two parts of the observation. The colour is the output of a
+#' network that is rounded to one of two actions, with a line at one half; or the action; or the
+#' value of an action that is a Box, with a line at the middle of its bounds. Regions carry the
+#' names of their actions. The path of an episode starts at the ring and ends at the cross.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object What [decision_map()] returned.
-#' @param xlab,ylab The axes' labels, strings; `NULL`, the default, for the names of the parts, with
-#'   their units where Gymnasium's documentation has them.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
+#' @param x,object The result of [decision_map()].
+#' @param xlab,ylab The axes' labels, strings. `NULL`, the default, uses the names of the parts,
+#'   with their units if Gymnasium's documentation has them.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_decision_map
 #' @exportS3Method ggplot2::autoplot
 #' @examples
@@ -39,7 +38,7 @@ autoplot.gym_decision_map <- function(object, ...) {
     theme_gym()
 }
 
-# The line between two actions, where both are there: ggplot2 warns where a line is nowhere.
+# The line between two actions, if both occur: ggplot2 warns about an empty line.
 border_line <- function(data) {
   if (is.null(data$border)) {
     return(NULL)
@@ -74,10 +73,10 @@ path_layers <- function(path) {
   )
 }
 
-#' Compute what a plot of a decision map shows
-#' @return A list: `points` (data frame `x`, `y`, `shown`, a number or a factor), `fill` (the scale
-#'   of the colours), `border` (the level of the line between, `NULL` where there is none),
-#'   `regions` (data frame: `x`, `y`, `label`).
+#' Compute the data of a plot of a decision map
+#' @return A list: `points` (data frame `x`, `y`, `shown`, a number or a factor), `fill` (the colour
+#'   scale), `border` (the level of the border line, or `NULL`), `regions` (data frame: `x`, `y`,
+#'   `label`).
 #' @noRd
 decision_plot_data <- function(x) {
   points <- stats::setNames(x$grid, c("x", "y", "shown"))
@@ -87,7 +86,7 @@ decision_plot_data <- function(x) {
   )
 }
 
-# The colours reach as far from one half as the outputs do, because small weights make small
+# The colours span the range of the outputs around one half, because small weights make small
 # differences.
 output_map <- function(x, points) {
   reach <- max(abs(points$shown - 0.5), 0.01)
@@ -99,7 +98,7 @@ output_map <- function(x, points) {
 
 value_map <- function(x, points) {
   limits <- x$limits %||% range(points$shown)
-  # One colour where there is only one value.
+  # One colour if there is only one value.
   limits <- if (diff(limits) > 0) limits else limits + c(-1, 1)
   list(points = points, fill = diverging_fill(x$actions, limits), border = mean(limits))
 }
@@ -118,16 +117,15 @@ choice_map <- function(x, points) {
     points = points, regions = regions,
     fill = ggplot2::scale_fill_manual(
       name = NULL, values = stats::setNames(action_colours(length(x$actions)), x$actions),
-      # Names in the regions need no key.
+      # If all names are in the regions, a key is not needed.
       guide = if (all(found %in% regions$label)) "none" else rows_of_key(found)
     )
   )
 }
 
-#' Find where the names of regions stand
+#' Place the names of regions
 #'
-#' The name stands at the point of the region that is farthest from others, where there
-#' is room for it.
+#' A name is at the point of its region that is farthest from other regions, if there is room.
 #' @param region The number of each point's region, from 1.
 #' @noRd
 region_labels <- function(points, region, labels) {
@@ -140,8 +138,7 @@ region_labels <- function(points, region, labels) {
   data.frame(x = x[at[, 1L]], y = y[at[, 2L]], label = labels[found])
 }
 
-# Points at the border are removed again and again, until none is left: those that are removed last
-# lie in the middle.
+# Remove border points again and again until none is left. The last ones are in the middle.
 region_middle <- function(inside) {
   repeat {
     n <- nrow(inside)

@@ -1,5 +1,5 @@
-# What an agent logs of its learning, by which one sees why it does not learn: a panel for each
-# number over the steps of the training.
+# The numbers that an agent logs about its learning, which show why it does not learn: a panel for
+# each number over the steps of the training.
 
 diagnostics_picture <- function(x, call = rlang::caller_env()) {
   names <- names(agent_log(x$agent))
@@ -14,7 +14,7 @@ diagnostics_picture <- function(x, call = rlang::caller_env()) {
     data.frame(steps = x$history$steps, name = name, value = x$history[[name]])
   }))
   rows$name <- factor(rows$name, names)
-  # Random episodes, which made the first moments of observations, taught nothing.
+  # Random episodes, which only supplied the first moments of observations, taught nothing.
   rows <- rows[is.finite(rows$value), ]
   ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +
     ggplot2::geom_line(colour = gym_colours[["blue"]], linewidth = 0.6) +

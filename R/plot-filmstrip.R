@@ -1,8 +1,8 @@
 # An episode on paper: some of its frames side by side.
 
-#' Pick frames that are evenly apart, the first and the last among them
+#' Pick evenly spaced frames, including the first and the last
 #' @param frames Of class `gym_frames`.
-#' @return A list of `frames` and `steps`, after how many steps each was taken.
+#' @return A list of `frames` and `steps`, the number of steps before each.
 #' @noRd
 pick_stills <- function(frames, n) {
   at <- unique(round(seq(1, length(frames), length.out = min(n, length(frames)))))
@@ -21,7 +21,7 @@ filmstrip <- function(stills) {
   grob_picture(grid::gTree(pictures = pictures, steps = stills$steps, cl = "gym_filmstrip"))
 }
 
-# How frames are arranged depends on the room that there is, so they are when they are drawn.
+# The arrangement of frames depends on the space available, which is known only when drawing.
 #' @exportS3Method grid::makeContent
 makeContent.gym_filmstrip <- function(x) { # nolint: object_name_linter.
   room <- grid::unit(1, "npc")
@@ -55,9 +55,9 @@ draw_still <- function(picture, step, i, strip, inches) {
   )
 }
 
-#' Cut off what is blank around all of several pictures
+#' Crop the blank border that all frames share
 #'
-#' Blank is what has the colour of a picture's corner. Some of it stays.
+#' Blank means the colour of a frame's corner. A margin remains.
 #' @param pictures Arrays of height x width x channels, all of one size.
 #' @noRd
 crop_blank <- function(pictures) {
@@ -79,8 +79,8 @@ busy_span <- function(busy) {
   seq(max(1, min(which(busy)) - around), min(length(busy), max(which(busy)) + around))
 }
 
-# Devices that draw pixels leave out most pixels of a large picture, and thin lines with them. For
-# these it is made smaller beforehand, by this factor.
+# Pixel devices drop most pixels of a large picture, and thin lines with them. For these it is made
+# smaller first, by this factor.
 device_shrinkage <- function(picture, inches) {
   if (names(grDevices::dev.cur()) %in% c("pdf", "postscript", "svg", "cairo_pdf", "cairo_ps")) {
     return(1L)
@@ -106,14 +106,14 @@ shrink <- function(picture, by) {
         c(size, dim(picture)[[3L]]))
 }
 
-#' Arrange pictures so that they are as large as may be
+#' Arrange frames so that they are as large as possible
 #'
-#' Full rows look better, if the pictures are not much smaller for it.
-#' @param aspect Their width by their height.
+#' Full rows look better, if the frames do not become much smaller.
+#' @param aspect Width divided by height of a frame.
 #' @param inches Width and height of the page.
-#' @return A list, all but the counts in inches: `columns`, `rows`, `width` and `height` of a
-#'   picture, `label` (the room above it), `gap` (between two), `cell` (width and height of
-#'   all of it), and `fontsize` of the label.
+#' @return A list, in inches except for the counts: `columns`, `rows`, `width` and `height` of a
+#'   frame, `label` (the height of the label above it), `gap` (between two frames), `cell` (total
+#'   width and height), and `fontsize` of the label.
 #' @noRd
 arrange_stills <- function(n, aspect, inches) {
   columns <- seq_len(n)
@@ -137,7 +137,7 @@ arrange_stills <- function(n, aspect, inches) {
   )
 }
 
-# The height of the label above a picture: a part of the picture's, but never too small to read.
+# The height of the label above a frame: proportional to the frame, but never too small to read.
 label_room <- function(height) min(max(0.2 * height, 0.13), 0.22)
 
 # The size of a filmstrip on paper: as wide as the text of a page.

@@ -1,14 +1,14 @@
 #' Show a frame
 #'
-#' Draws the picture as large as there is room for, its proportions kept.
+#' Draw a frame as large as possible without distorting it.
 #'
-#' `autoplot()` makes the picture, a ggplot; `plot()` prints it, too.
+#' `autoplot()` returns a ggplot. `plot()` also prints it.
 #'
 #' @inheritParams plot.gym_rollout
 #' @param x,object A frame, from [env_render()].
-#' @param main The title; `NULL`, the default, for none.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
+#' @param main The title. `NULL`, the default, for none.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_frame
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -21,7 +21,7 @@ autoplot.gym_frame <- function(object, ...) {
   grob_picture(grid::rasterGrob(as.raster(object)))
 }
 
-# A picture that is no plot of data: all room for what `grid` draws.
+# A picture without axes: all space is for what `grid` draws.
 grob_picture <- function(grob) {
   ggplot2::ggplot(data.frame(x = 0:1, y = 0:1), ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_blank() +

@@ -1,7 +1,7 @@
-# States on a grid: where they stand, and what is drawn in their cells.
+# States on a grid: where they are and what is drawn in their cells.
 
-# A picture of cells with the columns `row` and `column`; `layers` are those below the marks of the
-# environment.
+# A picture of cells with the columns `row` and `column`. `layers` are below the environment's
+# marks.
 grid_picture <- function(data, layers) {
   ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
     layers +
@@ -9,19 +9,19 @@ grid_picture <- function(data, layers) {
     ggplot2::scale_y_reverse() +
     ggplot2::coord_fixed() +
     theme_gym_bare() +
-    # Beside a square there is room for the key, above a wide grid.
+    # The key fits beside a square grid, or above a wide one.
     ggplot2::theme(legend.position = if (data$columns > 1.5 * data$rows) "top" else "right")
 }
 
-# The width of a square cell, in millimetres, where the picture is four inches wide.
+# The width of a square cell in millimetres, if the picture is four inches wide.
 cell_width <- function(data) min(91 / data$columns, 56 / data$rows)
 
-# Without a size ggplot2 makes cells as large as they are apart.
+# Without a size ggplot2 makes cells as large as the distance between them.
 cell_tiles <- function(mapping = NULL, ...) {
   ggplot2::geom_tile(mapping, ..., width = 1, height = 1, colour = "grey80", linewidth = 0.3)
 }
 
-# How large text may be in a cell, in millimetres; 0 where it could not be read.
+# The largest text size for a cell, in millimetres; 0 if it would be too small to read.
 text_size <- function(data, text) {
   cell <- cell_width(data)
   size <- min(3.2, 0.3 * cell, 0.85 * cell / (0.55 * max(nchar(text), 1L)))
@@ -30,9 +30,9 @@ text_size <- function(data, text) {
 
 arrow_steps <- list(left = c(-1, 0), right = c(1, 0), up = c(0, -1), down = c(0, 1))
 
-#' Draw what is done in each cell: arrows, or letters for what is no direction
+#' Draw the action in each cell: an arrow for a direction, a letter otherwise
 #' @param cells The cells, with the columns `does` and `ink`, the colour to draw with.
-#' @param above How much of a cell's height it stands above the middle.
+#' @param above How far above the middle to draw it, as a share of a cell's height.
 #' @noRd
 action_layers <- function(data, cells, above = 0) {
   cells$does <- as.character(cells$does)
@@ -58,21 +58,21 @@ action_layers <- function(data, cells, above = 0) {
   }))
 }
 
-# A layer for the cells with white ink and one for those with black, where there are some.
+# A layer for the cells with white ink and one for those with black, if there are any.
 each_ink <- function(cells, layer, others = NULL) {
   c(unname(lapply(split(cells, cells$ink), function(part) layer(part, part$ink[[1L]]))), others)
 }
 
 number_texts <- function(values) {
   largest <- max(abs(values[is.finite(values)]), 1e-6)
-  # Three digits, and those of 1 as those of 0.99.
+  # Three digits, with as many decimals for 1 as for 0.99.
   decimals <- max(0, 1 - floor(log10(largest) - 1e-6))
   text <- sprintf("%.*f", as.integer(decimals), values)
   text <- sub("^-(0[.]?0*)$", "\\1", text)
   ifelse(is.na(values), "", text)
 }
 
-# White on dark colours of values, black on light ones.
+# White on dark colours, black on light ones.
 ink_on <- function(values) {
   seen <- range(0, values[is.finite(values)])
   if (any(is.finite(values))) seen <- range(values, finite = TRUE)
@@ -81,7 +81,7 @@ ink_on <- function(values) {
 
 # Where states stand ---------------------------------------------------------------------
 
-# What the actions of Gymnasium's grids do, by the beginnings of their ids; see their documentation,
+# The directions of the actions on Gymnasium's grids, by the start of the environment's id; see
 # https://gymnasium.farama.org/environments/toy_text/.
 known_directions <- list(
   FrozenLake = c("left", "down", "right", "up"),
@@ -93,7 +93,7 @@ taxi_stands <- data.frame(
   label = c("R", "G", "Y", "B"), row = c(1, 1, 5, 5), column = c(1, 5, 1, 4)
 )
 
-# Which of Gymnasium's grids it is, "" for none of them.
+# Which of Gymnasium's grids it is, or "".
 known_grid <- function(id) {
   found <- names(known_directions)[startsWith(id, names(known_directions))]
   if (length(found)) found else ""
@@ -107,7 +107,7 @@ check_directions <- function(directions, count, call) {
   directions
 }
 
-# Puts states into rows and columns, where it is known how many columns there are.
+# Puts states into rows and columns, if the number of columns is known.
 grid_cells <- function(cells, columns, call) {
   if (is.null(columns)) {
     return(list(cells = cells))
@@ -122,7 +122,7 @@ grid_cells <- function(cells, columns, call) {
   list(cells = cells, columns = columns, rows = count / columns)
 }
 
-# A step down adds as many to the state's number as there are columns: the most common difference
+# A step down adds the number of columns to the state's number: it is the most common difference
 # above 1.
 grid_columns <- function(model) {
   further <- model$transitions$next_state - model$transitions$state
@@ -130,7 +130,7 @@ grid_columns <- function(model) {
   if (length(further)) as.integer(names(which.max(table(further))))
 }
 
-# The states of Taxi number the row, the column, the passenger and the destination, see its
+# Taxi's state number encodes the row, the column, the passenger and the destination, see its
 # documentation.
 taxi_cells <- function(cells, passenger, destination, walls, call) {
   check_count(passenger, min = 0, max = 4, call = call)
@@ -147,13 +147,13 @@ taxi_cells <- function(cells, passenger, destination, walls, call) {
   )
 }
 
-# The states from which a move to the right stays in its place.
+# The states from which a move to the right stays in place.
 taxi_walls <- function(model) {
   right <- model$transitions[model$transitions$action == 2L, ]
   right$state[right$state == right$next_state & right$probability == 1]
 }
 
-# Walls, and the letters of the stands.
+# The walls and the letters of the stands.
 taxi_layers <- function(data) {
   if (is.null(data$stands)) {
     return(NULL)

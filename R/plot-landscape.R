@@ -1,18 +1,17 @@
 #' Plot a landscape
 #'
-#' Shows the mean return of the networks around the best policy of a search: the lighter
-#' the higher, with lines of equal height. The cross in the middle is the best policy.
-#' The line of the target is thick.
+#' Show the mean return of the networks around the best policy of a search. Lighter is higher; lines
+#' connect equal returns. The cross in the middle is the best policy. The thick line is the target.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object What [search_landscape()] returned.
-#' @param main The title; `NULL`, the default, names the environment.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when no network was played to the end.
+#' @param x,object The result of [search_landscape()].
+#' @param main The title. `NULL`, the default, names the environment.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if no network was played to the end.
 #' @rdname plot.gym_landscape
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -51,8 +50,8 @@ autoplot.gym_landscape <- function(object, ...) {
     theme_gym()
 }
 
-#' Find the heights at which a landscape has lines
-#' @return A list: `range` (of the colours), `plain`, and `target`, where there is a line of it.
+#' Find the heights of a landscape's contour lines
+#' @return A list: `range` (of the colours), `plain`, and `target`, if it has a line.
 #' @noRd
 landscape_levels <- function(x, call = rlang::caller_env()) {
   played <- x$grid$mean_return
@@ -66,7 +65,7 @@ landscape_levels <- function(x, call = rlang::caller_env()) {
   inside <- function(level) level[level > span[[1L]] & level < span[[2L]]]
   list(
     range = if (diff(span) > 0) span else span + c(-1, 1),
-    # Where an interrupt left holes there may be no line, of which ggplot2 warns.
+    # After an interrupt there may be holes and no line; ggplot2 would warn.
     plain = if (!anyNA(played)) setdiff(inside(pretty(span, 5L)), x$target),
     target = if (!anyNA(played)) inside(x$target)
   )

@@ -1,33 +1,33 @@
 #' Plot a network
 #'
-#' Draws the diagram of a network: its layers from left to right, neurons as circles, weights as
-#' lines that are the wider the further from 0, blue where they are positive, vermillion and dashed
-#' where they are negative. Biases are the weights of a circle with a 1, the last of its layer. Few
-#' weights are written on the lines as numbers; of a layer with many neurons some are left out,
-#' which dots show.
+#' Draw the diagram of a network: its layers from left to right, neurons as circles, weights as
+#' lines. A line is wider the further its weight is from 0. Positive weights are blue; negative ones
+#' are vermillion and dashed. Biases are the weights of a circle with a 1, the last of its layer. If
+#' there are few weights, the lines carry their numbers. Dots stand for the neurons that are left
+#' out of a large layer.
 #'
-#' Inputs are named as the observation's parts and outputs as what they decide, where the
-#' policy knows its environment: because it was played there, or because it is given as `env`.
+#' Inputs have the names of the observation's parts, and outputs those of the actions, if the policy
+#' knows its environment: because it was played there, or from `env`.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object A network, as [policy_network()] makes it.
-#' @param env The environment: an id, such as `"CartPole-v1"` or what [gym_wrap()] returns, or
-#'   an environment made by [gym_make()]. `NULL`, the default, is that in which the policy
+#' @param x,object A network, made by [policy_network()].
+#' @param env The environment: an id, such as `"CartPole-v1"`, the result of [gym_wrap()], or an
+#'   environment made by [gym_make()]. `NULL`, the default, is the environment in which the policy
 #'   was played.
-#' @param neurons How many neurons of a layer to draw at most, a whole number of at least 3;
-#'   the default is 12.
-#' @param digits With how many digits to write weights on their lines. `NULL`, the
-#'   default, is 2 for up to 24 lines and none for more; 0 writes none.
-#' @param main The title; `NULL`, the default, names the environment and gives the sizes.
-#' @param client The client of the server that is asked about an environment named by its id;
-#'   the default is the session's own, [gym_client()].
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when the network does not fit the environment, and
-#'   for a policy that has no weights to draw, such as [policy_random()].
+#' @param neurons The largest number of neurons to draw in a layer, a whole number of at least 3.
+#'   The default is 12.
+#' @param digits The number of digits of the weights on their lines. `NULL`, the default, is 2 for
+#'   up to 24 lines and none for more; 0 writes none.
+#' @param main The title. `NULL`, the default, names the environment and the sizes of the layers.
+#' @param client The client of the server that is asked about an environment given by its id. The
+#'   default is the session's client, [gym_client()].
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if the network does not fit the environment, or for a
+#'   policy without weights to draw, such as [policy_random()].
 #' @seealso [decision_map()] shows what a network does.
 #' @rdname plot.gym_policy_network
 #' @aliases plot.gym_policy_network
@@ -69,7 +69,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
       name = NULL, limits = unname(name), values = stats::setNames(c("solid", "31"), name),
       guide = rows_of_key(name)
     ) +
-    # The names of inputs and outputs stand where axes have their numbers: there is room for them.
+    # The names of inputs and outputs are in the place of axis labels, which has room for them.
     ggplot2::scale_x_continuous(
       breaks = data$layers$x, labels = data$layers$label,
       expand = ggplot2::expansion(mult = 0.07)
@@ -87,7 +87,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     )
 }
 
-# The policy with the spaces of `env`, whose names the diagram shows; without `env` it keeps those
+# The policy with the spaces of `env`, whose names the diagram shows. Without `env` it keeps those
 # of the environment in which it was played.
 bind_to <- function(policy, env, client, call = rlang::caller_env()) {
   if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
@@ -95,7 +95,7 @@ bind_to <- function(policy, env, client, call = rlang::caller_env()) {
 
 network_sizes <- function(x) paste("network", paste(x$sizes, collapse = "-"))
 
-# White behind a number, so that its line does not go through it.
+# White behind a number, so that its line does not cross it.
 number_layers <- function(weights) {
   place <- ggplot2::aes(.data$label_x, .data$label_y, label = .data$label)
   list(
@@ -105,7 +105,7 @@ number_layers <- function(weights) {
   )
 }
 
-# Three dots where neurons are left out.
+# Three dots in place of left-out neurons.
 dots_between <- function(dots) {
   data.frame(x = rep(dots$x, each = 3L), y = rep(dots$y, each = 3L) + c(-0.02, 0, 0.02))
 }
@@ -134,15 +134,15 @@ autoplot.gym_policy <- function(object, ...) {
 
 # Where neurons and weights stand, and what they are called -------------------------------
 
-#' Compute what a diagram of a network shows
+#' Compute the data of a network diagram
 #'
-#' The layers stand at x = 0, 1, ..., the neurons between y = 0 and 1.
-#' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`,
-#'   `y`, `bias`, whether it is the constant 1 whose weights are the biases, and then the last of
-#'   its layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, where neurons are
-#'   left out), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
-#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label`, which stands at `label_x`,
-#'   `label_y`), `layers` (data frame `x`, `label`).
+#' The layers are at x = 0, 1, ..., the neurons between y = 0 and 1.
+#' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`, `y`,
+#'   `bias`, whether it is the constant 1 whose weights are the biases, and which is then the last
+#'   of its layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, the places of
+#'   left-out neurons), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
+#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label` with its place `label_x`, `label_y`),
+#'   `layers` (data frame `x`, `label`).
 #' @noRd
 network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
   check_network(policy, call)
@@ -166,8 +166,7 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   )
 }
 
-# Where there are too many neurons to draw, the first ones and the last one are drawn, with a place
-# for dots between them.
+# If there are too many neurons, draw the first ones and the last one, with a gap for dots.
 place_neurons <- function(size, layer, most) {
   shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
   y <- 1 - (seq_along(shown) - 0.5) / length(shown)
@@ -206,8 +205,8 @@ place_weights <- function(policy, neurons, digits) {
   weights
 }
 
-# How far along its line a weight's number stands, from 0 to 1. It is the same for all of a layer:
-# as near to the middle as possible, where the lines are at least 85 % as far apart as anywhere.
+# The place of a weight's number along its line, from 0 to 1. It is the same for a whole layer: as
+# near to the middle as possible, where the lines are at least 85 % of their largest distance apart.
 label_places <- function(weights) {
   apart <- function(layer, along) {
     heights <- sort(layer$y + along * (layer$yend - layer$y))

@@ -1,13 +1,12 @@
 #' Plot what a policy does in states of several parts
 #'
-#' Shows the action in each state as a colour, with two parts of the observation on the axes and a
-#' panel for each value of the others: for Blackjack the picture of Sutton and Barto (2018), figure
-#' 5.2.
+#' Show the action in each state as a colour, with two parts of the observation on the axes and a
+#' panel for each value of the others. For Blackjack this is figure 5.2 of Sutton and Barto (2018).
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
-#' @param object What [decision_map()] returned for observations of several parts with few values
+#' @param object The result of [decision_map()] for observations of several parts with few values
 #'   each.
 #' @param ... Not used.
 #' @return A ggplot.

@@ -1,4 +1,4 @@
-# How the returns of a rollout's episodes are distributed.
+# The distribution of the returns of a rollout's episodes.
 
 returns_picture <- function(x) {
   data <- returns_plot_data(x$episodes$return)
@@ -40,19 +40,19 @@ bar_layers <- function(bars) {
     ),
     ggplot2::scale_x_continuous(
       breaks = bar_marks(bars) %||% ggplot2::waiver(),
-      # One that stands alone is no wall.
+      # A single bar must not fill the picture.
       expand = ggplot2::expansion(mult = if (nrow(bars) == 1L) 2 else 0.05)
     )
   )
 }
 
-# With few different returns a density would show values that no episode had, so there are bars.
+# With few different returns a density would show values that no episode had, so use bars.
 most_bars <- 10L
 
-#' Compute what a plot of returns shows
+#' Compute the data of a plot of returns
 #' @return A list: `returns`, `median`, `bars` (data frame `value`, `episodes`, `xmin`, `xmax`,
-#'   `NULL` where there are many different returns), `density` (data frame `x`, `y`, `NULL` where
-#'   there are bars).
+#'   `NULL` if there are many different returns), `density` (data frame `x`, `y`, `NULL` if there
+#'   are bars).
 #' @noRd
 returns_plot_data <- function(returns) {
   values <- sort(unique(returns))
@@ -74,8 +74,8 @@ returns_plot_data <- function(returns) {
   )
 }
 
-# Bars are as wide as the two nearest values allow, and never too narrow to be seen `across` the
-# axis. One that stands alone is a fifth of a unit wide, or of a tenth of its value.
+# Bars are as wide as the two nearest values allow, but wide enough to be seen `across` the axis. A
+# single bar is a fifth of a unit wide, or of a tenth of its value.
 bar_half <- function(values, across = diff(range(values))) {
   if (length(values) == 1L) {
     0.2 * max(1, abs(values) / 10)
@@ -84,7 +84,7 @@ bar_half <- function(values, across = diff(range(values))) {
   }
 }
 
-# Marks at the values of bars; NULL where two of them are too near for their numbers to fit.
+# Axis marks at the values of bars; NULL if two are too near for their numbers to fit.
 bar_marks <- function(bars) {
   if (nrow(bars) == 1L || min(diff(bars$value)) > diff(range(bars$value)) / 12) bars$value
 }

@@ -1,54 +1,51 @@
 #' Plot a rollout, or compare several
 #'
-#' Three pictures of a rollout: of all of its episodes how their returns are distributed, and
-#' of one of them what was observed and done, or how it looked. Several rollouts, or one of several
-#' policies, are compared: a row for each policy shows how its returns are distributed.
+#' There are three pictures of a rollout: the distribution of the returns of all episodes, the
+#' observations and actions of one episode, and the frames of one episode. Several rollouts, or one
+#' of several policies, are compared: a row for each policy shows the distribution of its returns.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
-#' `"returns"` shows the density of the episodes' returns, the median marked, and each episode
-#' as a tick on the axis. Where there are few different returns, such as the 0 and 1 of
-#' FrozenLake, it shows a bar for each, as high as the number of its episodes: where there are
-#' at most 3, or at most 10 that come twice on average. In a comparison each row is as high as the
-#' others, whatever the numbers of episodes; of more than ten policies it shows those with the ten
-#' highest mean returns.
+#' `"returns"` shows the density of the returns, with the median marked, and each episode as a tick
+#' on the axis. Few different returns, such as the 0 and 1 of FrozenLake, have a bar each with the
+#' number of episodes. There are bars for at most 3 values, or for at most 10 that occur twice on
+#' average. In a comparison all rows have the same height. Of more than ten policies, the ten with
+#' the highest mean returns are shown.
 #'
-#' `"trajectory"` shows an episode's observations, each in a panel of its own, and below them its
-#' actions, against the number of steps taken. Where Gymnasium's documentation has units and what
-#' actions mean, the labels do, too. Dashed lines are limits at which the documentation says that
-#' an episode ends (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn where
-#' the episode comes near; a solid line is its end. The observations are those that the actions were
-#' taken on: the one after the last step is not among them. Takes a rollout with `steps = TRUE`.
-#' Where a wrapper changes what is observed, as `NormalizeObservation` does, the labels are `obs_1`
-#' and so on, and there are no limits.
+#' `"trajectory"` shows each part of an episode's observations in a panel, and the actions below
+#' them, against the number of steps. The labels use the units and the meanings of actions in
+#' Gymnasium's documentation. Dashed lines are limits at which an episode ends by that documentation
+#' (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn if the episode comes near.
+#' A solid line is the end. The observations are those before each action; the last one is not
+#' shown. This needs a rollout with `steps = TRUE`. If a wrapper changes observations, as
+#' `NormalizeObservation` does, the labels are `obs_1` and so on, without limits.
 #'
-#' `"filmstrip"` shows frames of an episode side by side, in rows where that makes them
-#' larger, evenly apart, the first and the last among them. Above and below, what is blank in all
-#' of them is cut off. Takes a rollout with `frames = TRUE`, and the package png.
+#' `"filmstrip"` shows evenly spaced frames of an episode, including the first and the last, in rows
+#' if that makes them larger. Blank space above and below is cut off if all frames have it. This
+#' needs a rollout with `frames = TRUE`, and the package png.
 #'
-#' @param x,object What [rollout()] returned. It may have another name, which is then that of its
-#'   row: `plot(random = played_1, network = played_2)`.
+#' @param x,object The result of [rollout()]. You may give it another name, which is then the name
+#'   of its row: `plot(random = played_1, network = played_2)`.
 #' @param type `"returns"`, the default, `"trajectory"` or `"filmstrip"`.
-#' @param episode Which episode to show, a whole number; the default is the first.
-#' @param variables The parts of the observation to show in a trajectory: names of columns of the
-#'   table of steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, takes the
-#'   first 8.
-#' @param n How many frames a filmstrip has at most, a whole number; the default is 8.
-#' @param candidate Whose episode to show where several policies were played, a whole number; the
-#'   default is the first.
-#' @param ... For `"returns"` further rollouts to compare, with the names of their rows or without.
-#'   Further arguments of `plot()` are those of `autoplot()`.
-#' @param main The title; `NULL`, the default, names the environment.
-#' @param xlab,ylab The axes' labels, strings; `NULL`, the default, for the picture's own.
-#' @param xlim,ylim The part of the axes to show, two numbers each; `NULL`, the default, for all.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, and for a
-#'   rollout that was played without the steps or frames that are to be shown.
+#' @param episode The episode to show, a whole number. The default is the first.
+#' @param variables The parts of the observation in a trajectory: names of columns of the table of
+#'   steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, shows the first 8.
+#' @param n The largest number of frames in a filmstrip, a whole number. The default is 8.
+#' @param candidate The candidate whose episode to show, if several policies were played, a whole
+#'   number. The default is the first.
+#' @param ... For `"returns"`, further rollouts to compare, optionally with names for their rows.
+#'   `plot()` passes its arguments to `autoplot()`.
+#' @param main The title. `NULL`, the default, names the environment.
+#' @param xlab,ylab The axes' labels, strings. `NULL`, the default, for the picture's own.
+#' @param xlim,ylim The part of the axes to show, two numbers each. `NULL`, the default, for all.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` for an invalid argument, or a rollout without the steps or
+#'   frames to be shown.
 #' @references The density is that of [stats::density()] with its default bandwidth, within
 #'   the range of the returns, as in the figure of the tutorial *Artificial Intelligence in R (I)*
 #'   (2018).
-#' @seealso [animate()] for a moving picture.
+#' @seealso [animate()] for an animation.
 #' @rdname plot.gym_rollout
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()

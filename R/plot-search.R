@@ -1,25 +1,24 @@
 #' Plot a search
 #'
-#' Shows how a search went: every episode as a point, the mean of each round as a
-#' line, the target as a dashed line. Episodes of a round that have almost the same
-#' return are set side by side.
+#' Show every episode of a search as a point, the mean of each round as a line, and the target as a
+#' dashed line. Points of a round with almost the same return are side by side.
 #'
-#' With another `type` it shows the network that was found, or plays the networks around it
-#' and shows their landscape, which takes some seconds each time: [search_landscape()] plays them
-#' once.
+#' Another `type` shows the network that was found, or the landscape of the networks around it. A
+#' landscape plays these networks, which takes some seconds each time. Use [search_landscape()] to
+#' play them once.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object A search, as [search_random()] returns it.
-#' @param type What to show: `"returns"`, the default; `"network"`, the best policy, as
-#'   [plot.gym_policy_network()]; or `"landscape"`, which plays [search_landscape()].
-#' @param main The title; `NULL`, the default, says what was searched.
-#' @param ... The arguments of the network's picture, or of [search_landscape()], such as `size` and
-#'   `seed`. Further arguments of `plot()` are those of `autoplot()`.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when no round was played to its end.
+#' @param x,object A search, as returned by [search_random()].
+#' @param type What to show: `"returns"`, the default; `"network"`, the best policy, by
+#'   [plot.gym_policy_network()]; or `"landscape"`, which calls [search_landscape()].
+#' @param main The title. `NULL`, the default, describes the search.
+#' @param ... Arguments of the network's picture, or of [search_landscape()], such as `size` and
+#'   `seed`. `plot()` passes its arguments to `autoplot()`.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if no round was played to its end.
 #' @rdname plot.gym_search
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -80,7 +79,7 @@ search_outcome <- function(x) {
   }
 }
 
-# The episodes with their place `x` on the axis.
+# The episodes with their `x` on the axis.
 search_points <- function(x, target) {
   points <- x$episodes[c("round", "return")]
   high <- diff(range(points$return, target))
@@ -88,8 +87,8 @@ search_points <- function(x, target) {
   points
 }
 
-# Offsets that put returns of one round which are closer than `near` side by side. They are not
-# drawn at random, because a plot leaves R's generator alone.
+# Offsets that put returns of one round side by side if they are closer than `near`. They are not
+# random, because a plot must not use R's generator.
 spread <- function(round, value, near) {
   bin <- if (near > 0) round(value / near) else value * 0
   group <- interaction(round, bin, drop = TRUE)

@@ -1,22 +1,21 @@
 #' Plot how many rounds searches needed
 #'
-#' Shows how many rounds searches with different seeds needed, as bars, beside the
-#' geometric distribution with the chance of a round, as a line. The bars up to round `mark`
-#' are dark, and a text says how many searches needed no more than that: `mark = 3`, the
-#' default, is as many as the tutorial *Artificial Intelligence in R (I)* (2018) needed. The
-#' searches that were not solved have a bar of their own at the right end.
+#' Show the number of rounds that searches with different seeds needed, as bars, and the geometric
+#' distribution with the success probability of a round, as a line. The bars up to round `mark` are
+#' dark, and a text says how many searches needed no more than that. The default, `mark = 3`, is the
+#' number of rounds in the tutorial *Artificial Intelligence in R (I)* (2018). Unsolved searches
+#' have a bar of their own at the right end.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object Searches, as [search_repeat()] returns them.
-#' @param mark Up to which round bars are marked, a whole number of at least 1, or `NULL` to mark
-#'   nothing.
-#' @param main The title; `NULL`, the default, says what was searched and how often.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when no search was solved.
+#' @param x,object Searches, as returned by [search_repeat()].
+#' @param mark The last round with a dark bar, a whole number of at least 1, or `NULL` for none.
+#' @param main The title. `NULL`, the default, describes the searches.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if no search was solved.
 #' @references The geometric distribution: [stats::dgeom()], counted from the first round.
 #' @rdname plot.gym_searches
 #' @exportS3Method ggplot2::autoplot
@@ -64,10 +63,10 @@ check_has_chance <- function(x, call = rlang::caller_env()) {
   }
 }
 
-#' Count the searches by the rounds that they needed
+#' Count the searches by the number of rounds that they needed
 #' @return A data frame with a row for each round up to the last in which a search was solved, and
-#'   one for the searches that were not: `round`, `x`, the place on the axis, `searches`,
-#'   `expected`, how many the geometric distribution gives, `unsolved`, `marked`.
+#'   one for the unsolved searches: `round`, `x`, the place on the axis, `searches`, `expected`, the
+#'   number by the geometric distribution, `unsolved`, `marked`.
 #' @noRd
 searches_bars <- function(x, mark) {
   n <- nrow(x$searches)
@@ -87,7 +86,7 @@ searches_bars <- function(x, mark) {
   bars
 }
 
-# The shares of the searches up to the mark, observed and as the distribution has them.
+# The shares of the searches up to the mark, observed and expected.
 marked_label <- function(x, mark) {
   observed <- mean(x$searches$solved & x$searches$round <= mark)
   paste0(

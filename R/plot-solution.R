@@ -1,35 +1,34 @@
 #' Plot the values of a solved model
 #'
-#' Shows what each state is worth as a colour, which is darker the less it is, and the action that
-#' is taken there as an arrow or a letter: on the lake of FrozenLake, beside the cliff of
-#' CliffWalking, on the grid of Taxi for one passenger and destination, and on any other grid whose
-#' `columns` are given. Where episodes end a mark tells goals from pits; where none ever is, as in a
-#' wall, the grid is empty. Other models have a point for each state.
+#' Show the value of each state as a colour (darker is lower) and its best action as an arrow or a
+#' letter. Supported grids are FrozenLake, CliffWalking, Taxi (for one passenger and destination)
+#' and any other grid whose `columns` you give. Marks show goals and pits, where episodes end. Cells
+#' that an episode never enters, such as walls, are empty. Other models have a point for each state.
 #'
-#' `type = "q"` shows what each action is worth: each cell has a triangle for each direction, at the
-#' side to which it leads, the best of them in bold. Actions that are no direction are left out.
+#' `type = "q"` shows the value of each action. Each cell has a triangle for each direction, with
+#' the best one in bold. Actions that are not directions are left out.
 #'
-#' Where all states in which episodes end give the same reward they are goals, unless going on gives
-#' more; otherwise those that give most are goals, and the others are pits.
+#' If all terminal states give the same reward, they are goals, unless going on gives more.
+#' Otherwise those with the largest reward are goals and the others are pits.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object What [solve_mdp()] returned.
+#' @param x,object The result of [solve_mdp()].
 #' @param type What to show, a string: `"values"`, the default, of states; or `"q"`, of actions.
-#' @param columns How many columns the grid has, where states are numbered row by row from the upper
-#'   left; `NULL`, the default, for what is known of the environment.
-#' @param directions What each action does on the grid, strings in the order of the actions:
-#'   `"left"`, `"right"`, `"up"`, `"down"`, or a letter to write. `NULL`, the default, for what is
-#'   known of the environment.
-#' @param passenger,destination Of Taxi: where the passenger is, from 0 to 3 for the stands R, G, Y
-#'   and B, or 4 for the taxi; and the stand that is the destination, from 0 to 3. The default is a
-#'   passenger at Y who goes to R.
-#' @param step Of a solution with a horizon: the step whose actions are shown, from 1, the default.
-#' @param main The title; `NULL`, the default, names the environment.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
+#' @param columns The number of columns of the grid, whose states are numbered row by row from the
+#'   upper left. `NULL`, the default, for a known environment.
+#' @param directions The meaning of each action on the grid, strings in the order of the actions:
+#'   `"left"`, `"right"`, `"up"`, `"down"`, or a letter to write. `NULL`, the default, for a known
+#'   environment.
+#' @param passenger,destination For Taxi: the passenger's place, from 0 to 3 for the stands R, G, Y
+#'   and B, or 4 for the taxi; and the destination, from 0 to 3. The default is a passenger at Y who
+#'   goes to R.
+#' @param step For a solution with a horizon: the step whose actions to show, from 1, the default.
+#' @param main The title. `NULL`, the default, names the environment.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_solution
 #' @exportS3Method ggplot2::autoplot
 #' @examples
@@ -72,12 +71,11 @@ solution_subtitle <- function(x, type) {
 
 # Data ----------------------------------------------------------------------------
 
-#' Compute what a plot of a solution shows
-#' @return A list: `cells`, a data frame with a row for each state that is shown and the columns
-#'   `state`, `value` (`NA` where no episode goes on), `end` (`"goal"`, `"pit"`, or `""` where
-#'   episodes go on or never are), `does` (what the action does), and on a grid `row` and `column`;
-#'   `directions`, one of each action; `columns` and `rows`, `NULL` without a grid; `walls` and
-#'   `stands` of Taxi.
+#' Compute the data of a plot of a solution
+#' @return A list: `cells`, a data frame with a row for each state shown and the columns `state`,
+#'   `value` (`NA` if no episode goes on there), `end` (`"goal"`, `"pit"`, or `""` for other
+#'   states), `does` (the meaning of the action), and on a grid `row` and `column`; `directions`,
+#'   one for each action; `columns` and `rows`, `NULL` without a grid; `walls` and `stands` of Taxi.
 #' @noRd
 solution_plot_data <- function(x, columns, directions, passenger, destination, step,
                                call = rlang::caller_env()) {
@@ -105,10 +103,9 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   c(placed, list(directions = directions))
 }
 
-#' What the states are: those that episodes go through, those in which they are over, and others
-#'
-#' @return A list of two logical vectors: `reached`, the states that episodes can be in when an
-#'   action is chosen, and `ends`, those of the others that end an episode when one arrives there.
+#' Find the states that episodes go through and those in which they end
+#' @return A list of two logical vectors: `reached`, the states in which an episode may choose an
+#'   action, and `ends`, those of the others that end an episode on arrival.
 #' @noRd
 state_kinds <- function(model) {
   table <- model$transitions
@@ -121,7 +118,7 @@ state_kinds <- function(model) {
   list(reached = reached, ends = one_of(to[!goes_on & reached[from]]) & !reached)
 }
 
-# Is the end of an episode a goal or a pit? The rewards of arriving there tell.
+# Is the end of an episode a goal or a pit? The rewards on arrival decide.
 end_kinds <- function(model, kinds) {
   table <- model$transitions
   table <- table[table$probability > 0, ]
@@ -138,7 +135,7 @@ end_kinds <- function(model, kinds) {
   ifelse(is.na(reward), "", ifelse(reward >= least, "goal", "pit"))
 }
 
-# The value of each action in each cell where episodes go on.
+# The value of each action in each cell in which episodes go on.
 q_of_cells <- function(x, data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   rows <- match(cells$state, state_numbers(x$model$observation_space))
@@ -159,7 +156,7 @@ q_of_cells <- function(x, data) {
 value_layers <- function(data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   size <- text_size(data, cells$text)
-  # Below the actions, where there are some.
+  # Below the actions, if there are any.
   below <- if (any(nzchar(cells$does))) 0.33 else 0
   c(
     list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
@@ -178,7 +175,8 @@ value_fill <- function() {
   continuous_fill("value", value_colours())
 }
 
-# A triangle is the side to which an action leads, and the middle of the cell.
+# The corners of a triangle: the two of the side to which an action leads, and the middle of the
+# cell.
 q_layers <- function(data) {
   moves <- data$q[data$q$direction %in% names(arrow_steps), ]
   moves$cell <- seq_len(nrow(moves))
@@ -194,7 +192,7 @@ q_layers <- function(data) {
   moves$y <- moves$row + 0.34 * step[, 2L]
   moves$text <- number_texts(moves$q)
   moves$ink <- ink_on(moves$q)
-  # Two numbers stand side by side.
+  # Two numbers are side by side.
   size <- text_size(data, strrep("0", 2 * nchar(moves$text) + 2))
   c(
     list(
@@ -251,7 +249,7 @@ value_points <- function(data) {
         size = 2.5, na.rm = TRUE
       )
     }) +
-    # Of more states the names would touch.
+    # With more states the names would overlap.
     (if (nrow(cells) <= 30L) {
       ggplot2::geom_text(
         ggplot2::aes(label = .data$does), cells[!is.na(cells$value), ], vjust = -0.9, size = 3

@@ -1,18 +1,18 @@
 #' Plot what a policy does in each state
 #'
-#' Shows the action that a policy takes in each state as an arrow or a letter and a colour: on the
-#' lake of FrozenLake, beside the cliff of CliffWalking, on the grid of Taxi for one passenger and
-#' destination, and on any other grid whose `columns` are given. Otherwise each state has a point.
+#' Show the action of a policy in each state as a colour and an arrow or a letter. Supported grids
+#' are FrozenLake, CliffWalking, Taxi (for one passenger and destination) and any other grid whose
+#' `columns` you give. Otherwise each state has a point.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_solution
-#' @param x,object What [decision_map()] returned for Discrete observations.
-#' @param columns How many columns the grid has, where states are numbered row by row from the upper
-#'   left; `NULL`, the default, for what is known of the environment: 12 of CliffWalking, and of
-#'   FrozenLake as many as it has rows.
-#' @return A ggplot; of `plot()` invisibly.
+#' @param x,object The result of [decision_map()] for Discrete observations.
+#' @param columns The number of columns of the grid, whose states are numbered row by row from the
+#'   upper left. `NULL`, the default, for a known environment: 12 for CliffWalking, and as many as
+#'   rows for FrozenLake.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_state_map
 #' @exportS3Method ggplot2::autoplot
 #' @examples
@@ -47,9 +47,9 @@ autoplot.gym_state_map <- function(object, ..., columns = NULL, directions = NUL
     )
 }
 
-#' Compute what a map of states shows
-#' @return As [solution_plot_data()], with `action`, a factor, instead of values, and `colours`, of
-#'   each action.
+#' Compute the data of a map of states
+#' @return As [solution_plot_data()], with `action`, a factor, instead of values, and `colours`, one
+#'   for each action.
 #' @noRd
 state_map_data <- function(x, columns, directions, passenger, destination,
                            call = rlang::caller_env()) {

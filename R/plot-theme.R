@@ -1,30 +1,30 @@
-# What all pictures share: the colours, the theme, the text above and the key.
+# Shared by all pictures: the colours, the theme, the text above and the key.
 
-# Colours that remain apart for the colour-blind (simulated as by Machado, Oliveira and Fernandes,
-# 2009), and in grey, because each is lighter than the one before it in this order:
-# blue, brown, purple, green, gold, sky.
+# Colours that remain distinct for colour-blind readers (simulated as by Machado, Oliveira and
+# Fernandes, 2009) and in grey, because each is lighter than the one before it in this order: blue,
+# brown, purple, green, gold, sky.
 gym_colours <- c(
   blue = "#003473", gold = "#CDA514", purple = "#9250C2", green = "#009A79", brown = "#833718",
   sky = "#A2CDE9", ink = "#333333"
 )
 
-# Of lines and areas that are told apart by colour alone.
+# For lines and areas that differ by colour alone.
 series_colours <- unname(gym_colours[c("blue", "gold", "purple", "green", "brown", "sky")])
 
 named_colours <- function(labels) {
   stats::setNames(rep_len(series_colours, length(labels)), labels)
 }
 
-# From low to high, light enough at both ends for black text. The ends differ in lightness, too.
+# From low to high, light enough at both ends for black text. The lightness of the ends differs,
+# too.
 diverging_colours <- c("#EFB549", "#FAF7F0", "#4797C8")
 
-# Regions and cells that have a colour for each action, light enough for black text.
+# For regions and cells with a colour for each action, light enough for black text.
 action_colours <- function(n) {
   light <- c("#F3D98B", "#A2CDE9", "#D9B8EE", "#7FC9B3", "#E3B7A2", "#EDEDED", "#C6D66B")
   if (n > length(light)) grDevices::hcl.colors(n, "viridis") else light[seq_len(n)]
 }
 
-# Values from low to high.
 value_colours <- function() grDevices::hcl.colors(101L, "viridis")
 
 theme_gym <- function() {
@@ -44,7 +44,7 @@ theme_gym <- function() {
     )
 }
 
-# A picture without axes: grids, diagrams and frames.
+# For pictures without axes: grids, diagrams and frames.
 theme_gym_bare <- function() {
   theme_gym() +
     ggplot2::theme(
@@ -53,9 +53,8 @@ theme_gym_bare <- function() {
     )
 }
 
-# Text above a picture is broken into lines that fit into four inches: ggplot2 cuts off what is
-# longer than the picture is wide.
-# The parts of a subtitle that are too long for one line have a line each.
+# Breaks the text above a picture into lines that fit four inches: ggplot2 cuts off longer ones. If
+# a subtitle does not fit one line, each part gets its own.
 picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, caption = NULL) {
   joined <- paste(subtitle, collapse = ", ")
   lines <- unlist(lapply(if (nchar(joined) > width) subtitle else joined, broken_text, width))
@@ -74,7 +73,7 @@ policy_subtitle <- function(x) paste("policy:", policy_label(x$policy))
 
 # The key -------------------------------------------------------------------------------
 
-# What a point or a line of a picture stands for.
+# The meaning of a point or a line.
 key_mark <- function(colour, shape = NA, line = "blank") {
   list(colour = gym_colours[[colour]], shape = shape, line = line)
 }
@@ -82,7 +81,7 @@ key_mark <- function(colour, shape = NA, line = "blank") {
 #' Make the key of a picture
 #'
 #' Layers name their mark by the colour, as in `aes(colour = "episode")`.
-#' @param marks A list of marks, named by what they stand for; those that are `NULL` are not drawn.
+#' @param marks A list of marks, named by their meaning. `NULL` marks are not drawn.
 #' @return A list, to be added to the picture.
 #' @noRd
 key_of_marks <- function(marks) {
@@ -99,12 +98,12 @@ key_of_marks <- function(marks) {
   )
 }
 
-# A key in as many rows as fit into four inches.
+# A key with as many rows as fit into four inches.
 rows_of_key <- function(labels, ...) {
   ggplot2::guide_legend(nrow = ceiling(sum(nchar(labels) + 6) / 54), byrow = TRUE, ...)
 }
 
-# The key of a scale of colours, with few numbers: they would touch.
+# The key of a colour scale, with few numbers so that they do not overlap.
 continuous_fill <- function(name, colours, ...) {
   ggplot2::scale_fill_gradientn(
     name = name, colours = colours, n.breaks = 4, guide = ggplot2::guide_colourbar(order = 1), ...
@@ -113,7 +112,7 @@ continuous_fill <- function(name, colours, ...) {
 
 target_label <- function(target) paste("target", number_text(target))
 
-# The line of a target, none where there is no target.
+# The line of the target, if there is one.
 target_line <- function(target) {
   if (!is.null(target)) {
     ggplot2::geom_hline(
@@ -138,14 +137,14 @@ number_axis <- function(scale, ...) {
   scale(labels = function(at) ifelse(is.na(at), NA, number_text_each(at)), ...)
 }
 
-# The marks of an axis: all whole numbers where there are only a few, because actions are whole.
+# Axis marks: all whole numbers if there are few, because actions are whole.
 few_breaks <- function(limits, n = 5) {
   from <- ceiling(limits[[1L]])
   to <- floor(limits[[2L]])
   if (from < to && to - from < n) from:to else pretty(limits, n)
 }
 
-# Rounds are whole numbers from 1, and so are the marks on their axis.
+# Rounds are whole numbers from 1, and so are their axis marks.
 round_ticks <- function(last) {
   at <- unique(round(pretty(c(1, last))))
   at[at >= 1 & at <= last]

@@ -1,30 +1,29 @@
 #' Plot a training
 #'
-#' Shows how a training went over the steps of the environment: the range of the returns that the
-#' agent played in each iteration as a band (those of its candidates; of an agent that learns from
-#' steps those of its episodes), their median as a line, the mean return of the agent's own policy,
-#' where it was evaluated, as points, and the target as a dashed line. The final evaluation is the
-#' filled point at the end, with its interval.
+#' Show a training over the steps of the environment. The band is the range of the returns of each
+#' iteration (of its candidates, or of its episodes for an agent that learns from steps), and the
+#' line is their median. Points are evaluations of the agent's own policy. The dashed line is the
+#' target. The filled point at the end is the final evaluation, with its interval.
 #'
-#' `type = "diagnostics"` shows what the agent logs of its learning (see [agent_log()]), a panel for
-#' each number. Of PPO (see [agent_ppo()]) the policy moves too far in an iteration where
-#' `approx_kl` is far above 0.02, has given up exploring where `entropy_loss` has come near 0, and
-#' its values predict nothing where `explained_variance` stays near 0.
+#' `type = "diagnostics"` shows the numbers that the agent logs (see [agent_log()]), one per panel.
+#' For PPO (see [agent_ppo()]): the policy moves too far in an iteration if `approx_kl` is far above
+#' 0.02, it has stopped exploring if `entropy_loss` is close to 0, and the value network predicts
+#' nothing if `explained_variance` stays near 0.
 #'
-#' Several trainings that are given together are compared as [plot.gym_trainings()] draws them.
+#' Several trainings are compared as in [plot.gym_trainings()].
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object A training, as [train_agent()] returns it. It may have another name, that of its
-#'   line, as in `plot(ARS = first, CEM = second)`.
-#' @param main The title; `NULL`, the default, names the environment and the agent.
-#' @param type What is shown, a string: `"returns"`, the default, or `"diagnostics"`, of a single
+#' @param x,object A training, as returned by [train_agent()]. You may give it another name, which
+#'   is then the name of its line, as in `plot(ARS = first, CEM = second)`.
+#' @param main The title. `NULL`, the default, names the environment and the agent.
+#' @param type What to show, a string: `"returns"`, the default, or `"diagnostics"`, for a single
 #'   training.
-#' @param ... Further trainings to compare, with the names of their lines or without.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when no iteration was played to its end.
+#' @param ... Further trainings to compare, optionally with names for their lines.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if no iteration was played to its end.
 #' @rdname plot.gym_training
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -96,7 +95,7 @@ check_has_history <- function(x, call = rlang::caller_env()) {
   }
 }
 
-# The evaluations with the steps that had been taken. Of several final ones the last counts.
+# The evaluations and their places in steps. Of several final ones the last counts.
 placed_evaluations <- function(x) {
   evaluations <- x$evaluations
   evaluations$steps <- evaluation_steps(x)

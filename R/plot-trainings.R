@@ -2,10 +2,10 @@
 
 #' Plot trainings
 #'
-#' Shows how good the agents' own policies were over the steps of the environment: of trainings with
-#' several seeds ([gym_trainings]) the median of the seeds as a line and the middle half of them as
-#' a band, of a single training its evaluations as a line; the target is a dashed line. Several that
-#' are given together are compared in one picture.
+#' Show the returns of the agents' own policies over the steps of the environment. For trainings
+#' with several seeds ([gym_trainings]), the line is the median of the seeds and the band their
+#' middle half. For a single training, the line connects its evaluations. The dashed line is the
+#' target. Several trainings are compared in one picture.
 #'
 #' Between two evaluations a training's return is taken from the straight line between them. The
 #' line of several seeds is thick as long as all of them train. From where the first one has ended
@@ -13,17 +13,18 @@
 #' evaluation. A picture begins where all seeds were evaluated once. Where targets, budgets or rules
 #' of evaluation differ in one environment, the caption names them.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object Trainings, as `train_agent(seeds = )` returns them. It may have another name,
-#'   that of its line, as in `plot(ARS = first, CEM = second)`.
-#' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, with the
-#'   names of their lines or without.
-#' @param main The title; `NULL`, the default, names environment, agent and number of seeds.
-#' @return A ggplot; of `plot()` invisibly.
-#' @section Errors: `gym_error_argument` when a training was never evaluated.
+#' @param x,object Trainings, as returned by `train_agent(seeds = )`. You may give them another
+#'   name, which is then the name of their line, as in `plot(ARS = first, CEM = second)`.
+#' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, optionally
+#'   with names for their lines.
+#' @param main The title. `NULL`, the default, names the environment, the agent and the number of
+#'   seeds.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if a training was never evaluated.
 #' @rdname plot.gym_trainings
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -60,7 +61,7 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
       ggplot2::aes(y = .data$median), lines_of(curves, curves$steps >= curves$first_end),
       linewidth = 0.3, show.legend = FALSE
     ) +
-    # A line of one point is not seen.
+    # A line of one point is invisible.
     ggplot2::geom_pointrange(
       ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper), alone,
       show.legend = FALSE
@@ -77,7 +78,7 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     theme_gym()
 }
 
-# The rows of those labels of which these are more than a point.
+# The rows of labels with more than one point.
 lines_of <- function(curves, rows) {
   curves <- curves[rows, ]
   curves[curves$label %in% names(which(table(curves$label) > 1L)), ]
@@ -97,10 +98,9 @@ common_target <- function(trainings) {
   if (length(targets) == 1L && length(targets[[1L]])) finite_target(targets[[1L]])
 }
 
-# At how many places along the axis the seeds are compared.
+# The number of places along the axis at which the seeds are compared.
 curve_places <- 200L
 
-# The evaluations of each seed.
 evaluation_curves <- function(x, label, call) {
   each <- lapply(if (inherits(x, "gym_trainings")) x$trainings else list(x), evaluation_curve)
   each <- each[vapply(each, nrow, 0L) > 0L]
@@ -113,7 +113,8 @@ evaluation_curves <- function(x, label, call) {
   each
 }
 
-# The evaluations of a training; of several at one place the last, which had the most episodes.
+# The evaluations of a training. Of several at one place, the last counts, which had the most
+# episodes.
 evaluation_curve <- function(training) {
   steps <- evaluation_steps(training)
   last <- !duplicated(steps, fromLast = TRUE)
@@ -121,10 +122,11 @@ evaluation_curve <- function(training) {
 }
 
 #' Compute the line and the band of one training or several seeds
-#' @param each What [evaluation_curves()] returned.
+#' @param each The result of [evaluation_curves()].
 #' @param last Where the picture ends, in steps.
 #' @return A data frame with a row for each place: `label`, `steps`, `median`, `lower`, `upper` of
-#'   the seeds, `ended`, whether a seed had ended before, and `first_end`, where the first one did.
+#'   the seeds, `ended`, whether a seed had ended before, and `first_end`, the place where the first
+#'   one ended.
 #' @noRd
 trainings_curve <- function(each, label, last) {
   from <- max(vapply(each, function(curve) min(curve$steps), 0))
@@ -137,7 +139,7 @@ trainings_curve <- function(each, label, last) {
   }
   steps <- sort(unique(c(steps, first_end, if (length(steps) > 1L) last)))
   values <- vapply(each, function(curve) {
-    # With a single evaluation it stays what it was.
+    # A single evaluation stays as it is.
     if (nrow(curve) == 1L) {
       rep(curve$mean_return, length(steps))
     } else {

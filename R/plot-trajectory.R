@@ -13,7 +13,7 @@ trajectory_picture <- function(x, data) {
       )
     }) +
     ggplot2::geom_vline(xintercept = data$length, colour = ending_colours[[data$ending]]) +
-    # A line of one step would not be seen.
+    # A line of one step would be invisible.
     (if (data$length == 1L) {
       ggplot2::geom_point(place, values[values$kind != "choice", ], na.rm = TRUE)
     } else {
@@ -41,8 +41,8 @@ trajectory_picture <- function(x, data) {
 limit_colours <- c(failure = gym_colours[["brown"]], goal = gym_colours[["green"]])
 ending_colours <- c(terminated = gym_colours[["brown"]], truncated = "grey50")
 
-# The values with the kind of their panel and the number of an action that they are, `""` where an
-# action is one.
+# The values with the kind of their panel, and the number of an action as text, `""` if an action
+# has only one number.
 panel_values <- function(data) {
   values <- data$values
   values$kind <- data$panels$kind[match(values$panel, data$panels$panel)]
@@ -53,7 +53,7 @@ panel_values <- function(data) {
   values
 }
 
-# The numbers of an action share a panel and have a key, other lines have one colour.
+# The numbers of an action share a panel and have a key; other lines have one colour.
 part_scale <- function(parts) {
   named <- parts[nzchar(parts)]
   ggplot2::scale_colour_manual(
@@ -63,8 +63,8 @@ part_scale <- function(parts) {
   )
 }
 
-# Actions that are one of few: a bar from a step's beginning to its end, in the action's place and
-# colour. Those that were never chosen have their place, too.
+# Discrete actions: a bar for each step, in the action's place and colour. Actions that never occur
+# have a place, too.
 choice_layers <- function(values, choices) {
   if (is.null(choices)) {
     return(NULL)
@@ -91,8 +91,8 @@ choice_labels <- function(choices) {
   ifelse(choices$label == number, number, paste0(number, ": ", choices$label))
 }
 
-# The axis of a panel in which a value is constant has a mark at this value alone. ggplot2 passes
-# only the limits of a panel: around a constant that is 0.05 to either side.
+# If a value is constant, the axis of its panel has one mark at this value. ggplot2 passes only the
+# limits of a panel: 0.05 to either side of the constant.
 trajectory_breaks <- function(values) {
   shown <- values[values$kind != "choice" & is.finite(values$value), ]
   each <- split(shown$value, shown$panel)
@@ -115,7 +115,7 @@ near_rows <- function(data) {
   near
 }
 
-# The titles of panels say at which values episodes end.
+# The titles of panels give the values at which episodes end.
 panel_titles <- function(data) {
   labels <- data$panels$panel
   text <- vapply(labels, function(label) {
@@ -127,18 +127,17 @@ panel_titles <- function(data) {
 }
 
 most_panels <- 8L
-# There are as many colours for lines.
+# There are as many line colours.
 most_actions <- length(series_colours)
 
-#' Compute what a trajectory shows
+#' Compute the data of a trajectory
 #' @param variables Names of columns, `NULL` for the observation's first.
 #' @return A list: `panels` (data frame with one row for each panel from the top: `panel`, its
-#'   label; `kind`, `"line"`, `"stairs"` for whole numbers, or `"choice"` for actions that are one
-#'   of few), `values` (data frame: `panel`, `name` (the column), `step`, `time` (steps taken
-#'   beforehand), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data
-#'   frame `value`, `label`, of the actions, `NULL` where they are not one of few), `actions`
-#'   (labels of the actions' columns, named by them), `length` and `ending`, `"terminated"` or
-#'   `"truncated"`, `subtitle`.
+#'   label; `kind`, `"line"`, `"stairs"` for whole numbers, or `"choice"` for discrete actions),
+#'   `values` (data frame: `panel`, `name` (the column), `step`, `time` (the number of steps
+#'   before), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data frame
+#'   `value`, `label`, of discrete actions, otherwise `NULL`), `actions` (labels of the actions'
+#'   columns, named by them), `length` and `ending`, `"terminated"` or `"truncated"`, `subtitle`.
 #' @noRd
 trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1,
                                  call = rlang::caller_env()) {
@@ -174,7 +173,7 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
   )
 }
 
-# The row of an episode in the table of episodes. Those of each candidate are counted apart.
+# The row of an episode in the table of episodes. Each candidate's episodes are numbered from 1.
 episode_row <- function(x, episode, candidate, call) {
   candidates <- x$episodes$candidate %||% rep(1L, nrow(x$episodes))
   check_count(candidate, max = max(candidates, 1L), call = call)
@@ -239,8 +238,8 @@ text_list <- function(names, most = 10L) {
 
 # Actions ---------------------------------------------------------------------------
 
-# The possible actions, where an action is one of few whole numbers, with the names of the
-# environment's documentation where it has some. NULL for other actions.
+# The possible actions, if they are few whole numbers, named as in the environment's documentation.
+# NULL for other actions.
 action_choices <- function(x, actions) {
   value <- if (length(actions) == 1L) as.numeric(actions[[1L]])
   if (is.null(value) || !all_whole(value)) {
@@ -290,8 +289,8 @@ trajectory_limits <- function(env_id, observed, labels) {
   do.call(rbind, c(list(none), rows))
 }
 
-# The limits that are near the values. Showing one far away would make the values a flat line: they
-# keep at least about a tenth of the height.
+# The limits near the values. A limit far away would flatten the values, which must keep at least
+# about a tenth of the height.
 near_limits <- function(at, value) {
   if (!any(is.finite(value))) {
     return(numeric())
@@ -300,7 +299,7 @@ near_limits <- function(at, value) {
   at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
 }
 
-# `row` is the episode's in the table of episodes.
+# `row` is the episode's row in the table of episodes.
 trajectory_subtitle <- function(row) {
   ending <- if (row$terminated) "terminated" else "truncated"
   of <- if (!is.null(row$candidate)) paste0("candidate ", row$candidate, ", ")

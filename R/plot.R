@@ -1,9 +1,10 @@
-# plot() of a result prints the picture that autoplot() makes. Printing needs ggplot2's namespace,
+# plot() of a result prints the picture made by autoplot(). Printing needs ggplot2's namespace,
 # which is loaded by the first picture and not with this package.
 
 show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL) {
   arguments <- arguments_as_written(quote(x))
-  # Results go as variables: a name such as `episode` would be taken for autoplot()'s argument.
+  # Pass results as variables: a name such as `episode` would be taken for an argument of
+  # autoplot().
   named <- vapply(arguments, is_comparable, NA)
   names(arguments) <- rlang::names2(arguments)
   names <- make.unique(names(arguments)[named], " ")

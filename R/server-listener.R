@@ -2,14 +2,14 @@
 
 #' Find out what listens at an address
 #'
-#' Asks for a route that every Gym server has, a classic one too.
-#' @param timeout How long the answer may take, in seconds. A server that takes connections
-#'   but does not answer in time listens nevertheless.
-#' @param token The token of a server that is known to be ours; any other program is sent none.
-#' @return A list of `listens`, `is_gym` and `asks_token` (it wants another token, or one; all
-#'   three are logical), `status` (of the answer), `name` (by which the program identifies
-#'   itself, a string or `NULL`), `instances` (how many a Gym server has) and `problem` (why
-#'   there is no answer, a string or `NULL`).
+#' Calls a route that every Gym server has, including a classic one.
+#' @param timeout The time for the answer, in seconds. A server that accepts connections but does
+#'   not answer in time still counts as listening.
+#' @param token The token of a server that is known to be ours. Other programs get none.
+#' @return A list of `listens`, `is_gym` and `asks_token` (whether it needs a token, or another one;
+#'   all three are logical), `status` (of the answer), `name` (of the program, by its own account, a
+#'   string or `NULL`), `instances` (their number on a Gym server) and `problem` (why there is no
+#'   answer, a string or `NULL`).
 #' @noRd
 probe_server <- function(base, timeout, token = NULL) {
   client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE), token)
@@ -35,8 +35,8 @@ probe_server <- function(base, timeout, token = NULL) {
   )
 }
 
-#' Say what has the port that a server was to take
-#' @return A sentence, `NULL` when nothing seems to listen there.
+#' Say which program has the port of a server
+#' @return A sentence, `NULL` if nothing seems to listen there.
 #' @noRd
 port_holder <- function(base) {
   holder <- probe_server(base, timeout = 2)

@@ -1,14 +1,14 @@
-# The server as a process of this session's: its start, its first lines of output, its end.
+# The server as a process of this session: its start, its first lines of output, its end.
 
-# Runs the server as `-m gym_server` does, but without the working directory in Python's search
-# path, where a file named random.py would replace Python's own module.
+# Runs the server like `-m gym_server`, but without the working directory in Python's search path: a
+# file random.py there would replace Python's own module.
 run_server <- paste0(
   "import sys; sys.path[:] = [place for place in sys.path if place]; ",
   "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
 )
 
-# Starts the server with one Python. Returns a description of the running server, or a string that
-# says why this Python cannot run it.
+# Starts the server with one Python. Returns a description of the running server, or a string with
+# the reason why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
@@ -17,8 +17,8 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
       python, c(arguments, "--own-log", log),
       stdin = "|", stdout = "|", stderr = log,
       env = server_environment(),
-      # processx would kill the server, and a forked child would do so, too. Instead the session
-      # closes the server's standard input, which has the server close its environments and end.
+      # processx or a forked child would kill the server. Instead the session closes the server's
+      # standard input; the server then closes its environments and ends.
       cleanup = FALSE, windows_hide_window = TRUE
     ),
     error = function(cnd) NULL
@@ -43,7 +43,7 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   refusal_reason(lines)
 }
 
-# Why a Python could not be started at all. A bare name is looked for on the PATH.
+# Why a Python could not be started. A bare name is looked for on the PATH.
 not_started_reason <- function(python) {
   if (basename(python) != python && !file.exists(python)) {
     "there is no such file"
@@ -52,7 +52,7 @@ not_started_reason <- function(python) {
   }
 }
 
-# Why a Python cannot run the server, from the lines that it wrote.
+# Why a Python cannot run the server, from its output.
 refusal_reason <- function(lines) {
   lines <- lines[nzchar(lines)]
   if (!length(lines)) {
@@ -61,11 +61,11 @@ refusal_reason <- function(lines) {
   sub("^gym_server cannot run on this Python [(].*[)]: ", "", utils::tail(lines, 1L))
 }
 
-# How a line of the server itself begins when it cannot start as it was asked to. Other lines come
-# from a Python that cannot run it, or from a program that only has the name of one.
+# The start of a line in which the server itself says why it cannot start. Other lines come from a
+# Python that cannot run it, or from a program that only has the name of one.
 server_line_start <- "^(gym_server:|gym-http-server: error)"
 
-# What has the port that the server wanted, when the server ended for that reason.
+# Which program has the server's port, if the server ended for that reason.
 port_hint <- function(line) {
   parts <- regmatches(line, regexec("port ([0-9]+) on ([^ ]+) cannot be used", line))[[1L]]
   if (length(parts)) {
@@ -81,14 +81,14 @@ server_environment <- function() {
     "current",
     PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
     PYTHONUNBUFFERED = "1",
-    # R's library may be another user's; nothing is written there.
+    # R's library may belong to another user; write nothing there.
     PYTHONDONTWRITEBYTECODE = "1",
     own_library_path()
   )
 }
 
-# LD_LIBRARY_PATH as it was before R put its own folders in front, in which Python would find the
-# libraries of another Python.
+# LD_LIBRARY_PATH without the folders that R put in front. Python would find another Python's
+# libraries there.
 own_library_path <- function() {
   path <- Sys.getenv("LD_LIBRARY_PATH")
   script <- file.path(R.home("etc"), "ldpaths")
@@ -99,16 +99,15 @@ own_library_path <- function() {
     "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
     env = c("current", LD_LIBRARY_PATH = "")
   )$stdout
-  # They stand there more than once where R was started by R.
+  # They occur several times if R was started from R.
   while (nzchar(added) && startsWith(path, added)) {
     path <- sub("^:", "", substring(path, nchar(added) + 1L))
   }
   c(LD_LIBRARY_PATH = path)
 }
 
-# Waits for the line by which the server reports that it takes connections. Returns a list of its
-# address, `url`, and the `token` of its own that it has told before; NULL when the process ended
-# first.
+# Waits for the line by which the server reports that it accepts connections. Returns a list of its
+# address, `url`, and its own `token` from an earlier line; NULL if the process ended first.
 await_start <- function(process, log, timeout, call) {
   deadline <- Sys.time() + timeout
   lines <- character()
@@ -125,7 +124,7 @@ await_start <- function(process, log, timeout, call) {
     lines <- c(lines, process$read_output_lines())
     address <- said_after("Server starting at: ", lines)
     if (!is.null(address)) {
-      # A server that listens on all addresses is reached by the loopback address.
+      # A server that listens on all addresses is also at the loopback address.
       url <- sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)
       return(list(url = url, token = as_token(said_after("Token: ", lines), call)))
     }
@@ -136,7 +135,7 @@ await_start <- function(process, log, timeout, call) {
   }
 }
 
-# What follows a beginning in the first line that has it, NULL where none has.
+# The rest of the first line with this beginning, or NULL.
 said_after <- function(beginning, lines) {
   line <- lines[startsWith(lines, beginning)]
   if (length(line)) substring(line[[1L]], nchar(beginning) + 1L)
@@ -173,16 +172,16 @@ stop_server <- function(server, timeout = 15) {
   }
 }
 
-# Closes the server's standard input, by which it ends. The line before says that this session is
-# still there: where it was killed there is none, and the server removes its log by itself.
+# Closes the server's standard input, which stops it. The line before says that this session still
+# exists. Without it (the session was killed), the server removes its log by itself.
 close_server_input <- function(server) {
-  # It is closed already when an earlier stop was interrupted.
+  # It is already closed if an earlier stop was interrupted.
   try(server$process$write_input("stop\n"), silent = TRUE)
   try(close(server$process$get_input_connection()), silent = TRUE)
 }
 
-# Asks the server to end by a signal, as its standard input stays open while a forked child of this
-# session lives. A server that was stopped by SIGSTOP receives SIGTERM when it continues.
+# Stops the server by a signal, because its standard input stays open while a forked child of this
+# session lives. A server paused by SIGSTOP receives SIGTERM when it continues.
 terminate_server <- function(server) {
   if (server$process$is_alive() && !is_windows()) {
     server$process$signal(tools::SIGTERM)

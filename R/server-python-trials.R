@@ -1,10 +1,10 @@
-# Whether Pythons can run the server, which is found out without starting it.
+# Whether Pythons can run the server, checked without starting it.
 
 #' Try Pythons, all at once
 #'
-#' Each imports all of the server and prints its version.
+#' Each imports the whole server and prints its version.
 #' @param pythons Paths of Pythons, a character vector.
-#' @param timeout How long all of them may take together, in seconds.
+#' @param timeout The time for all of them together, in seconds.
 #' @return A data frame with one row for each: `python`, `version` (a string or `NA`), `runs`
 #'   (logical, `NA` when it did not answer in time), `reason` (why it cannot run the
 #'   server, a string or `NA`) and `extras` (those of the server that it has, separated by ", ").
@@ -40,7 +40,7 @@ extras_in <- function(modules) {
   paste(names(which(has)), collapse = ", ")
 }
 
-# Returns the running process and its output files, NULL when it could not be started.
+# Returns the running process and its output files, or NULL if it could not be started.
 begin_trial <- function(python) {
   output <- temporary_file("gym-python-", fileext = c(".out", ".err"))
   process <- with_own_tree_id(tryCatch(

@@ -1,7 +1,7 @@
-# Which Python runs the server: where it is looked for, and the error when there is none.
+# Which Python runs the server: where to look for it, and the error if there is none.
 
 #' Say that no Python can run the server
-#' @param refusals Why each Python that was tried cannot, strings named by its path.
+#' @param refusals Why each tried Python cannot, strings named by its path.
 #' @noRd
 abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
   named <- named_python(python)
@@ -17,7 +17,7 @@ abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
   )
 }
 
-# The message for users who need not know what Python is; details are in gym_sitrep().
+# The message for users who do not know Python; gym_sitrep() has the details.
 no_python_message <- function(refusals) {
   own <- refusals[names(refusals) %in% installed_server()$python]
   if (length(own)) {
@@ -56,13 +56,13 @@ named_python_message <- function(named, refusals, python) {
 
 quote_for_terminal <- function(path) shQuote(path, if (is_windows()) "cmd" else "sh")
 
-# The Python that the user chose, NULL when there was no choice.
+# The Python that the user chose, or NULL.
 named_python <- function(python) {
   named <- python %||% Sys.getenv("GYM_PYTHON")
   if (nzchar(named)) path.expand(named)
 }
 
-# Where Python may be, in the order in which it is tried.
+# Where Python may be, in the order of the trials.
 python_candidates <- function(python = NULL) {
   named <- named_python(python)
   if (!is.null(named)) {
@@ -72,13 +72,13 @@ python_candidates <- function(python = NULL) {
   folder <- if (is_windows()) c("Scripts", ".") else "bin"
   places <- file.path(rep(active[nzchar(active)], each = length(folder)), folder)
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
-  # In the folder WindowsApps lies a program named python that opens the Store.
+  # The folder WindowsApps has a program named python that opens the Store.
   path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
   if (lacks_developer_tools()) {
     path <- setdiff(path, "/usr/bin")
   }
   found <- c(pythons_in(places), installed_server()$python, pythons_in(path))
-  # An environment's Python may be a link to one that lies elsewhere and lacks its packages.
+  # The Python of an environment may be a link to one elsewhere that lacks its packages.
   found[!duplicated(paste(normalizePath(dirname(found)), normalizePath(found)))]
 }
 

@@ -1,4 +1,4 @@
-# What gym_sitrep() finds, topic by topic. Each function returns rows as finding() makes them.
+# The findings of gym_sitrep(), topic by topic. Each function returns rows made by finding().
 
 sitrep_versions <- function() {
   packages <- c("httr", "curl", "jsonlite", "processx")
@@ -11,11 +11,11 @@ sitrep_versions <- function() {
   )
 }
 
-# The library that multiplies matrices. R's own, which Windows has, is named by no file, or is
-# Rblas; Debian's reference is libblas itself. Measured: an update of PPO of 64 rows, two networks
-# with two hidden layers of 64.
+# The library that multiplies matrices. R's own has no file name (Windows) or is Rblas; Debian's
+# reference is libblas itself. Measured: an update of PPO of 64 rows, two networks with two hidden
+# layers of 64.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
-  # A fast one may be a libblas.so.3, too, in a folder that says so.
+  # A fast one may also be a libblas.so.3, in a folder with its name.
   slow <- !nzchar(file) || grepl("Rblas|/libblas[.]", file) && !grepl("openblas|atlas|blis", file)
   if (!slow) {
     return(finding("R", "BLAS", file))
@@ -46,7 +46,7 @@ sitrep_suggested <- function(packages = suggested_packages) {
   )
 }
 
-# Secrets are left out, as the report is meant to be shown to others.
+# Secrets are left out, because people show the report to others.
 sitrep_variables <- function(variables) {
   texts <- if (length(variables)) {
     values <- ifelse(names(variables) == token_variable, "<token>", without_password(variables))
@@ -55,7 +55,7 @@ sitrep_variables <- function(variables) {
   finding("R", "variables", texts %||% "none of the package's is set")
 }
 
-# `needed`: whether nothing else can run the server, so that a missing environment is wrong.
+# `needed`: whether nothing else can run the server, so that a missing environment is a problem.
 sitrep_environment <- function(needed) {
   server <- installed_server()
   folders <- install_folders()
@@ -144,7 +144,7 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
   ))
 }
 
-# The servers that this session started, without those that it stopped.
+# The running servers that this session started.
 sitrep_own_servers <- function() {
   servers <- the_session$servers
   servers <- servers[!duplicated(vapply(servers, function(server) server$pid, 0L))]

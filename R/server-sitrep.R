@@ -1,19 +1,18 @@
-#' See how things stand
+#' Check the installation
 #'
-#' Looks at everything that the package needs to play: R and packages, the installed Python
-#' environment, the Pythons that would be tried, servers, and the environment variables that
-#' the package reads. Prints it on one screen, marks what is wrong and names the call that
-#' fixes it. It changes nothing and asks nothing, and takes a few seconds at most. For a bug
-#' report it can stand in an R Markdown document.
+#' Look at everything that the package needs: R and its packages, the installed Python environment,
+#' the Pythons on the machine, servers, and environment variables. Print the findings on one screen,
+#' mark problems and name the call that fixes each. This changes nothing, asks nothing, and takes a
+#' few seconds at most. For a bug report you can use it in an R Markdown document.
 #'
-#' @return Invisibly, what was found: a data frame of class `gym_sitrep` with one row for
-#'   each finding and the columns
+#' @return Invisibly, the findings: a data frame of class `gym_sitrep` with one row for each finding
+#'   and the columns
 #'   \describe{
-#'     \item{topic}{What it belongs to, a string: `"R"`, `"Python"`, `"servers"`.}
-#'     \item{what}{What was looked at, a string.}
-#'     \item{finding}{What was found, a string.}
-#'     \item{state}{`"ok"`; `"note"` for what may well be so; `"wrong"`.}
-#'     \item{fix}{The call that helps, a string, or `NA`.}
+#'   \item{topic}{A string: `"R"`, `"Python"`, `"servers"`.}
+#'   \item{what}{What was checked, a string.}
+#'   \item{finding}{What was found, a string.}
+#'   \item{state}{`"ok"`, `"note"` for something that may be intended, or `"wrong"`.}
+#'   \item{fix}{The call that helps, a string, or `NA`.}
 #'   }
 #'   The token and passwords in addresses are left out.
 #' @seealso [gym_server_install()], [gym_server_log()]
@@ -50,7 +49,7 @@ finding <- function(topic, what, finding, state = "ok", fix = NA_character_) {
   data.frame(topic, what, finding, state, fix)
 }
 
-# Who calls gym_sitrep() has a problem already: an error in finding something out becomes a finding.
+# Users of gym_sitrep() already have a problem, so an error here becomes a finding.
 attempt_rows <- function(topic, what, rows) {
   tryCatch(rows, error = function(cnd) {
     finding(topic, what, paste("could not be found out:", conditionMessage(cnd)), "wrong")

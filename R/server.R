@@ -1,7 +1,7 @@
-# Local servers: started by this session, ended with it. The server ends when its
-# standard input closes, which happens however the R session ends.
+# Local servers, which start and end with this session. A server ends when its standard input
+# closes. That happens however the R session ends.
 
-# A forked child uses its parent's server, of whose process it cannot ask whether it runs.
+# A forked child uses its parent's server and cannot ask its process whether it runs.
 is_running <- function(base) {
   server <- the_session$servers[[base]]
   !is.null(server) && (Sys.getpid() != the_session$pid || server$process$is_alive())
@@ -9,56 +9,51 @@ is_running <- function(base) {
 
 #' Start a server on this machine
 #'
-#' Starts the server that comes with the package as a process of its own and
-#' waits until it takes connections. It stops with the R session, also when that
-#' is killed.
+#' Start the server that comes with the package, as a process of its own, and wait until it accepts
+#' connections. It stops with the R session, even if the session is killed.
 #'
-#' Python is looked for in `python`; in the environment variable `GYM_PYTHON`; in
-#' an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); where
-#' [gym_server_install()] has put it; on the `PATH`.
-#' The first that can run the server is used. Where `python` or `GYM_PYTHON`
-#' names one, no other is tried. [gym_sitrep()] shows the result.
+#' The server runs with the first suitable Python in this order: `python`; the environment variable
+#' `GYM_PYTHON`; an active virtual environment (`VIRTUAL_ENV`, `CONDA_PREFIX`); the environment made
+#' by [gym_server_install()]; the `PATH`. If you set `python` or `GYM_PYTHON`, no other Python is
+#' tried. [gym_sitrep()] shows the result.
 #'
-#' @section Where there is no Python:
-#' Without a Python that can run the server an interactive session asks once whether to
-#' install one, by [gym_server_install()], and then continues with the call. A
-#' script stops with an error, or, with the environment variable `GYM_INSTALL=1`,
-#' installs it without asking. Where `python` or `GYM_PYTHON` names a Python nothing
-#' is installed.
-#' @param port The port to listen on, a whole number; `NULL`, the default, takes
-#'   a free one.
+#' @section If there is no Python:
+#' If no Python can run the server, an interactive session asks once whether to install one by
+#' [gym_server_install()], and then continues with the call. A script stops with an error or, with
+#' the environment variable `GYM_INSTALL=1`, installs it without asking. Nothing is installed if you
+#' set `python` or `GYM_PYTHON`.
+#' @param port The port to listen on, a whole number. `NULL`, the default, uses a free one.
 #' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
-#' @param ... Further options of the server, by name: `monitor_dir = "runs"` is
-#'   its `--monitor-dir runs`. `log_level = "info"` logs what is made and closed,
-#'   `allow_module = c("a", "b")` names Python modules whose environments may be
-#'   made. Limits for all clients together are `max_instances` (environments, 1,000),
-#'   `max_num_envs` (sub-environments of one, 16,384), `max_total_sub_envs` (four times as many),
-#'   `max_processes` (of their own that environments have, 128), `max_rollout_processes` (that play
-#'   whole episodes, one a core), `max_memory_mb` (of all
-#'   environments, estimated before they are made, 4,096), `max_monitor_mb` (that all monitors
-#'   together may write on the disk, 4,096), `max_watchers` (100),
-#'   `max_body_mb` (of a request, 16), `max_call_seconds` (that a call may take before its
-#'   environment is evicted, 300, 0 for no limit) and
-#'   `idle_minutes` (until an environment that nobody uses or watches is evicted, 1,440,
-#'   0 for never). `token_file = "token"` names a file with a token of 16
-#'   characters or more, which every call must then carry in place of the server's own one.
-#'   What else a server for a group takes (`isolate`, `max_worker_mb`, `allow_host`, `allow_path`,
-#'   `no_auth`, `no_shutdown`) is described in `vignette("server", package = "gym")`.
-#' @param timeout How long the start may take, in seconds; the default is 60.
-#' @param token Whether the server asks for a token of its own, `TRUE` or `FALSE`. It makes one at
-#'   its start and tells it to this session alone, so that no other account of the machine can use
-#'   it: the client that is returned carries the token, and so does each one that
-#'   [create_GymClient()] makes for the server's address in this session. Other processes, such as
-#'   another R session or clients in other languages, need a token that they know, or `FALSE`. The
-#'   default is `TRUE` for a server without `port`, and `FALSE` for one with a port, whose address
-#'   scripts name: any account of the machine can use that one, which is said in a message of class
-#'   `gym_message_open_server`. What `token_file`, `no_auth = TRUE` or the environment variable
-#'   `GYM_SERVER_TOKEN` say comes first.
-#' @return A client for the server, as [create_GymClient()] makes it.
-#' @section Errors: `gym_error_server_start`, with the server's own message: no
-#'   Python can run it, the port is taken, it did not start in time; `gym_error_install`
-#'   when a Python environment was to be installed first, and could not be;
-#'   `gym_error_argument`.
+#' @param ... Further options of the server, by name: `monitor_dir = "runs"` means
+#'   `--monitor-dir runs`.
+#'   * `log_level = "info"` logs what is made and closed.
+#'   * `allow_module = c("a", "b")` names Python modules whose environments may be made.
+#'   * `token_file = "token"` names a file with a token of 16 characters or more, which replaces the
+#'   server's own one.
+#'   * Limits for all clients together (with their defaults): `max_instances` (environments, 1,000),
+#'   `max_num_envs` (sub-environments of one environment, 16,384), `max_total_sub_envs` (four times
+#'   as many), `max_processes` (of environments, 128), `max_rollout_processes` (that play whole
+#'   episodes, one per core), `max_memory_mb` (of all environments, estimated before they are made,
+#'   4,096), `max_monitor_mb` (of all monitors on the disk, 4,096), `max_watchers` (100) and
+#'   `max_body_mb` (of a request, 16).
+#'   * `max_call_seconds` is the time after which a call fails and its environment is removed (300;
+#'   0 for no limit). `idle_minutes` is the time after which an unused environment is removed
+#'   (1,440; 0 for never).
+#'   * `vignette("server", package = "gym")` describes the options of a server for a group:
+#'   `isolate`, `max_worker_mb`, `allow_host`, `allow_path`, `no_auth`, `no_shutdown`.
+#' @param timeout The time for the start, in seconds. The default is 60.
+#' @param token Should the server require its own token? `TRUE` or `FALSE`. It makes the token at
+#'   its start and gives it to this session only, so other accounts of the machine cannot use the
+#'   server. The returned client carries the token, and so does each client that
+#'   [create_GymClient()] makes for this address in this session. Other processes, such as another R
+#'   session or clients in other languages, need `FALSE` or a token that they know. The default is
+#'   `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
+#'   the machine can then use the server, as a message of class `gym_message_open_server` says.
+#'   `token_file`, `no_auth = TRUE` and the environment variable `GYM_SERVER_TOKEN` take precedence.
+#' @return A client for the server, as returned by [create_GymClient()].
+#' @section Errors: `gym_error_server_start`, with the server's own message, if no Python can run
+#'   it, the port is taken or the start takes too long. `gym_error_install` if a Python environment
+#'   could not be installed. `gym_error_argument`.
 #' @seealso [gym_server_stop()], [gym_server_log()], [gym_client()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -67,7 +62,7 @@ is_running <- function(base) {
 #' gym_server_stop(server)
 gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
                              token = is.null(port)) {
-  # First, as every later error would show the call.
+  # Evaluate the token first: any later error would show the call with it.
   check_own_token(token)
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
@@ -99,9 +94,9 @@ check_own_token <- function(token, call = rlang::caller_env()) {
 }
 
 #' Start a server with the first Python that can run it
-#' @param token Whether it asks for a token of its own, unless there is another one.
-#' @param install Whether a Python environment may be installed, after a question or as
-#'   `GYM_INSTALL` says, when no Python can run the server.
+#' @param token Should it require its own token, unless there is another one?
+#' @param install May a Python environment be installed (after a question, or by `GYM_INSTALL`) if
+#'   no Python can run the server?
 #' @return A client for the server.
 #' @noRd
 start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60, token = TRUE,
@@ -114,7 +109,7 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
     if (token && !says_token(options)) "--own-token", server_options(options, call)
   )
   refusals <- character()
-  # Launches the server with the first Python that can run it. Returns NULL when none can.
+  # Launches the server with the first Python that can run it, or returns NULL.
   launch_with_first <- function(pythons) {
     for (candidate in pythons) {
       server <- launch_server(candidate, arguments, timeout, call)
@@ -133,25 +128,25 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
 register_server <- function(server) {
   server$extra_hint <- function(extra) installed_extra_hint(extra, server$python)
   the_session$servers[[server$url]] <- server
-  # At the session's end R runs the youngest finalizer first. One that is registered now, after the
-  # process was started, runs before the one of processx: the process can still be asked to end.
-  # The list keeps the object from being collected as garbage, which would run its finalizer early.
+  # At the session's end R runs the youngest finalizer first. This one is registered after the
+  # process was started, so it runs before processx's: the process can still be asked to end. The
+  # list protects the object from garbage collection, which would run its finalizer early.
   ending <- new.env(parent = emptyenv())
   reg.finalizer(ending, function(ending) end_session(the_session), onexit = TRUE)
   the_session$endings <- c(the_session$endings, ending)
   new_client(server$url, token = server$token)
 }
 
-# How to install an extra on a server that runs from what gym_server_install() made, which finds it
-# there; NULL for a server with another Python, which somebody else looks after.
+# How to install an extra, if the server runs in the environment of gym_server_install(). It is NULL
+# for a server with another Python, which somebody else maintains.
 installed_extra_hint <- function(extra, python) {
   if (is_installed_python(python)) {
     paste0("`gym_server_install(extras = \"", extra, "\")` installs it, and this server finds it")
   }
 }
 
-# Options in the form of a command line: log_level = "info" becomes --log-level info, TRUE becomes a
-# flag, a vector one option for each element.
+# Options as a command line: log_level = "info" becomes --log-level info, TRUE a flag, and a vector
+# one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
   check_dots_named(options, "log_level = \"info\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
@@ -167,7 +162,7 @@ server_options <- function(options, call = rlang::caller_env()) {
   ), use.names = FALSE)
 }
 
-# Writes numbers without an exponent: 1e5 is 100000 on a command line.
+# Numbers without exponents: 1e5 must be 100000 on a command line.
 option_text <- function(values) {
   values <- plain_numbers(values)
   if (is.numeric(values)) {
@@ -180,14 +175,13 @@ option_text <- function(values) {
 
 #' Stop a server that this session started
 #'
-#' The server finishes the calls under way and closes its environments; one that
-#' does not end within 15 seconds is killed.
+#' The server finishes running calls and closes its environments. It is killed if it does not end
+#' within 15 seconds.
 #'
-#' @param client The client that [gym_server_start()] returned; `NULL`, the
-#'   default, stands for the session's own server, that of [gym_client()].
-#' @return Nothing, invisibly. Stopping a server twice does no harm.
-#' @section Errors: `gym_error_argument` for a server that this session did not
-#'   start.
+#' @param client The client returned by [gym_server_start()]. `NULL`, the default, is the session's
+#'   own server, that of [gym_client()].
+#' @return Nothing, invisibly. You may stop a server twice.
+#' @section Errors: `gym_error_argument` for a server that this session did not start.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' server <- gym_server_start()
@@ -199,12 +193,11 @@ gym_server_stop <- function(client = NULL) {
 
 #' Read a server's log
 #'
-#' Warnings and errors of a server that this session started, and what its
-#' environments print; also after its end. A log beyond 8 MiB is cut to its last MiB.
+#' Return the warnings and errors of a server that this session started, and the output of its
+#' environments. This also works after its end. A log that exceeds 8 MiB is cut to its last MiB.
 #'
 #' @inheritParams gym_server_stop
-#' @return A character vector, one element a line; `character(0)` when the server
-#'   wrote nothing.
+#' @return A character vector with an element for each line; `character(0)` if there is no output.
 #' @inheritSection gym_server_stop Errors
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -233,12 +226,12 @@ session_server <- function(client, call = rlang::caller_env()) {
   )
 }
 
-# Ends the session's servers and closes its instances on others, in a limited time:
+# Stops the session's servers and closes its instances on others, in a limited time:
 #
-# 1. The standard input of each server is closed, on which servers close their environments and end.
-# 2. Instances on other servers are closed, within half of the time.
-# 3. Servers that still run at half of the time are asked again, by a signal.
-# 4. A server that takes longer than the whole time, perhaps to finish a video, is abandoned.
+# 1. Close the standard input of each server. Servers then close their environments and end.
+# 2. Close instances on other servers, within half of the time.
+# 3. At half of the time, send a signal to servers that still run.
+# 4. Abandon a server that takes longer than the whole time, perhaps to finish a video.
 end_session <- function(session) {
   if (isTRUE(session$ended)) {
     return()

@@ -1,24 +1,29 @@
-#' Where a result comes from
+#' Show how a result was made
 #'
-#' Every result keeps what made it: versions, system, the library of linear algebra (whose sums
-#' differ in the last bits from machine to machine), environment, seeds and time. `provenance()`
-#' gives it, also of the file of a checkpoint.
+#' Every result records how it was made: versions, system, the library of linear algebra (whose sums
+#' differ in the last bits between machines), environment, seeds and time. `provenance()` returns
+#' this record, also for a checkpoint file.
 #'
-#' @param x A result: what [rollout()], [evaluate_policy()], [train_agent()], [search_random()] or
-#'   [search_repeat()] returned; or the file of a checkpoint, a string.
+#' @param x The result of [rollout()], [evaluate_policy()], [train_agent()], [search_random()] or
+#'   [search_repeat()]; or the file of a checkpoint, a string.
 #' @param ... Not used.
-#' @return An object of class `gym_provenance`, which prints a line for each of its elements; a list
-#'   of `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK` (strings), `server` (the versions of the
-#'   server, a named list of strings; `NULL` for an environment in R), `processor` (a string:
-#'   that of the server, where its processes play, as the last bits of NumPy depend on it),
-#'   `way` (`"beside the environment"` or `"step by step"`, see [rollout()]; of a learner how it
-#'   learns), `env_id` (a string), `kwargs` (the environment's own arguments, a named list),
-#'   `wrappers` (strings), `num_envs` (a whole number; `NULL` beside the environment), `seed` (whole
-#'   numbers), `preset` (a list, `NULL` where none was taken), `started` (a date with time) and
-#'   `elapsed` (seconds, a double). Rollouts and evaluations have no times, `NULL` and `NA`, so that
-#'   two with the same seed are identical.
-#' @section Errors: `gym_error_argument` for something that has no provenance,
-#'   `gym_error_checkpoint` for a file that is no checkpoint.
+#' @return An object of class `gym_provenance`, which prints a line for each element. It is a list
+#'   of
+#'   * `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK`: strings,
+#'   * `server`: the versions of the server, a named list of strings; `NULL` for an environment in
+#'   R,
+#'   * `processor`: a string; the server's processor if its processes play, because the last bits of
+#'   NumPy depend on it,
+#'   * `way`: `"beside the environment"` or `"step by step"`, see [rollout()]; for a learner, how it
+#'   learns,
+#'   * `env_id` (a string), `kwargs` (the environment's arguments, a named list), `wrappers`
+#'   (strings),
+#'   * `num_envs`: a whole number; `NULL` beside the environment,
+#'   * `seed` (whole numbers), `preset` (a list, or `NULL`),
+#'   * `started` (a date with time) and `elapsed` (seconds, a double). Rollouts and evaluations have
+#'   no times, `NULL` and `NA`, so that two with the same seed are identical.
+#' @section Errors: `gym_error_argument` for an object without provenance, `gym_error_checkpoint`
+#'   for a file that is not a checkpoint.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' provenance(rollout("CartPole-v1", policy_random(), episodes = 10, seed = 1))

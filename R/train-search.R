@@ -1,6 +1,6 @@
 # The result of a search, class gym_search: a training that keeps its episodes.
 
-# What a search has beside what every training has.
+# The elements of a search that other trainings do not have.
 search_parts <- function(settings, state, history) {
   episodes <- do.call(rbind, c(list(episodes_table(list(), several = TRUE)), state$episodes))
   names(episodes)[[1L]] <- "round"
@@ -15,39 +15,36 @@ search_parts <- function(settings, state, history) {
   )
 }
 
-#' Use what a search has found
+#' Use the result of a search
 #'
-#' A search returns an object of class `gym_search`, a training that R's usual functions know:
-#' `print()` says in a few lines what came of it, `as.data.frame()` gives its episodes,
-#' `predict()` what the policy that was found does, and `summary()` plays that policy in
-#' fresh episodes to estimate how good it is. `print()`, `predict()` and [plot()][plot.gym_search()]
-#' never touch R's generator.
+#' A search is an object of class `gym_search`, a training with methods for R's usual functions.
+#' `print()` summarises it in a few lines, `as.data.frame()` returns its episodes, `predict()`
+#' returns the actions of its best policy, and `summary()` plays that policy in new episodes to
+#' estimate its mean return. `print()`, `predict()` and [plot()][plot.gym_search()] never use R's
+#' random number generator.
 #'
-#' The best of many rounds of a few episodes has also been lucky, so its mean return in the
-#' search is too high an estimate. `summary()` therefore plays it again. Gym's own definition of
-#' solved is a mean return of at least the environment's threshold over 100 consecutive episodes.
+#' The best of many rounds of a few episodes was also lucky, so its mean return in the search is an
+#' overestimate. That is why `summary()` plays the policy again. By Gym's own definition, an
+#' environment is solved by a mean return of at least its threshold over 100 consecutive episodes.
 #'
-#' @param x,object A search, as [search_random()] returns it.
+#' @param x,object A search, as returned by [search_random()].
 #' @param row.names,optional,... Not used.
-#' @param episodes How many fresh episodes to play, a whole number of at least 1; the
-#'   default is 100.
-#' @param seed A whole number that fixes the fresh episodes and leaves the session's
-#'   generator as it was, or `NULL`, the default, to draw from the session's generator.
-#' @return `as.data.frame()`: a data frame with one row for each episode of the search, in
-#'   their order: `round`, `episode`, `seed`, `sub_env` (integers),
-#'   `return` (double), `length` (integer, in steps), `terminated`, `truncated` (logical).
+#' @param episodes The number of new episodes, a whole number of at least 1. The default is 100.
+#' @param seed A whole number that fixes the new episodes and leaves the session's generator as it
+#'   was. `NULL`, the default, draws a seed from the session's generator.
+#' @return `as.data.frame()`: a data frame with one row for each episode of the search, in order:
+#'   `round`, `episode`, `seed`, `sub_env` (integers), `return` (double), `length` (integer, in
+#'   steps), `terminated`, `truncated` (logical).
 #'
-#'   `predict()`: as that of the [policy][predict.gym_policy()].
+#'   `predict()`: the same as for the [policy][predict.gym_policy()].
 #'
-#'   `summary()`: an object of class `summary.gym_search`, a list with the elements `search`
-#'   (the search), `rounds`, `episodes`, `steps` (how many the search used, integers),
-#'   `fresh` (the [rollout()] of the policy found), `mean` and `se` (its mean return and the
-#'   standard error, doubles) and `reached` (logical: has the mean of the fresh episodes
-#'   reached the target?).
-#' @section Errors: `gym_error_argument` when the search has no policy because it was ended
-#'   in its first round, or `newdata` does not fit the policy. `summary()` needs the
-#'   environment: of one given to the search as an object, it has to be open still, and the
-#'   errors are those of [rollout()].
+#'   `summary()`: an object of class `summary.gym_search`, a list with the elements `search` (the
+#'   search), `rounds`, `episodes`, `steps` (their numbers in the search, integers), `fresh` (the
+#'   [rollout()] of the policy), `mean` and `se` (its mean return and the standard error, doubles)
+#'   and `reached` (logical: has the mean of the new episodes reached the target?).
+#' @section Errors: `gym_error_argument` if the search has no policy because it was stopped in its
+#'   first round, or if `newdata` does not fit the policy. `summary()` needs the environment: if the
+#'   search got it as an object, it must still be open. Its errors are those of [rollout()].
 #' @references The definition of solved: the text of CartPole-v0 in Gym ("average reward of
 #'   195.0 over 100 consecutive trials"), and `reward_threshold` in Gymnasium's registry.
 #' @name gym_search
