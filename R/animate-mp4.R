@@ -1,16 +1,16 @@
-# Episodes as MP4 files: the package av writes them, or the program ffmpeg, which the server's extra
-# "video" brings along.
+# Episodes as MP4 files, written by the package av or by the program ffmpeg, which the server's
+# extra "video" includes.
 
 #' Write frames as an MP4 file
-#' @param fps How many pictures make a second.
+#' @param fps The number of frames per second.
 #' @inheritParams write_gif
-#' @return The size of the pictures in pixels, width and height, which are even in most videos.
+#' @return The size of the frames in pixels, width and height, which are even in most videos.
 #' @noRd
 write_mp4 <- function(pngs, file, fps, width = NULL, call = rlang::caller_env(2)) {
   folder <- temporary_file()
   dir.create(folder)
   on.exit(unlink(folder, recursive = TRUE))
-  # The last picture stays for a second.
+  # The last frame stays for a second.
   shown <- c(seq_along(pngs), rep(length(pngs), max(0, round(fps) - 1)))
   pictures <- file.path(folder, sprintf("%06d.png", seq_along(shown)))
   Map(writeBin, pngs[shown], pictures)
@@ -48,7 +48,7 @@ check_writes_mp4 <- function(call) {
   }
 }
 
-# The program of the system, or that of the Python which runs the session's server, or would.
+# The system's program, or that of the Python that runs, or would run, the session's server.
 find_ffmpeg <- function() {
   found <- unname(Sys.which("ffmpeg"))
   if (nzchar(found)) {

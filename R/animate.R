@@ -1,42 +1,41 @@
 #' Make an animation of an episode
 #'
-#' Writes an episode as an animated GIF file, or as an MP4 video: of a rollout one that was played
-#' with `frames = TRUE`,
-#' of a search, a training or a policy a fresh one, which is played for it. Printed in an
-#' interactive session it opens in RStudio's viewer, else in the browser (`options(gym.viewer = )`
-#' names another function that opens it, or `FALSE`), and a document of knitr has it on the page,
-#' one made by LaTeX its [filmstrip][plot.gym_rollout()].
+#' Write an episode as an animated GIF file or an MP4 video. A rollout must have been played with
+#' `frames = TRUE`; for a search, a training or a policy, a new episode is played. Printing the
+#' result in an interactive session opens it in RStudio's viewer or else in the browser
+#' (`options(gym.viewer = )` sets another function, or `FALSE`). A knitr document shows it on the
+#' page, or, with LaTeX, as a [filmstrip][plot.gym_rollout()].
 #'
-#' A GIF takes the package magick; an MP4 the package av, or the program ffmpeg, which the server's
-#' extra `"video"` brings along (see [gym_server_install()]).
+#' A GIF requires the package magick. An MP4 requires the package av, or the program ffmpeg, which
+#' the server's extra `"video"` includes (see [gym_server_install()]).
 #'
-#' The episode is shown at the environment's own pace. A GIF counts in hundredths of a second, and
-#' browsers take a delay of less than two for a slow one of ten: so there are at most 50
-#' pictures a second, of faster environments only every second frame, or fewer still.
+#' The animation has the environment's own speed. A GIF counts in hundredths of a second, and
+#' browsers show delays of less than two of them as ten. A GIF therefore has at most 50 frames a
+#' second; faster environments show every second frame or fewer.
 #'
 #' @param x A rollout, a search, a training, or a policy as for [rollout()].
-#' @param file The file to write, its name ends in `.gif` or `.mp4`. `NULL`, the default, is a GIF
-#'   among the session's temporary files.
-#' @param fps How many steps of the environment make a second, a number; `NULL`, the default,
-#'   leaves it to the environment (50 in CartPole; 30 where it does not say).
+#' @param file The file to write; its name ends in `.gif` or `.mp4`. `NULL`, the default, is a
+#'   temporary GIF file.
+#' @param fps The number of steps per second, a number. `NULL`, the default, uses the environment's
+#'   own (50 in CartPole; 30 if it has none).
 #' @param ... For methods.
-#' @param episode Which episode of the rollout to show, a whole number; the default is the first.
-#' @param candidate Whose episode where several policies were played, a whole number; the default
-#'   is the first.
-#' @param width The picture's width in pixels, a whole number; `NULL`, the default, is that of
-#'   the environment's frames (600 in CartPole). In an MP4 width and height are even.
-#' @param every Show every frame, 1, every second one, 2, and so on, at the same pace; the last one
-#'   is always shown. `NULL`, the default, shows as many as the format can at that pace; a number
-#'   too small for it is raised to that, with a message.
+#' @param episode The episode of the rollout to show, a whole number. The default is the first.
+#' @param candidate The candidate whose episode to show, if several policies were played, a whole
+#'   number. The default is the first.
+#' @param width The width in pixels, a whole number. `NULL`, the default, is that of the
+#'   environment's frames (600 in CartPole). In an MP4, width and height are even.
+#' @param every Show every frame (1), every second one (2), and so on, at the same speed. The last
+#'   one is always shown. `NULL`, the default, shows as many as the format allows at that speed. A
+#'   smaller number is raised to that, with a message.
 #' @param seed A whole number that fixes the episode played, as in [rollout()].
 #' @param env,max_steps,client What to play in, as in [rollout()].
-#' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (after
-#'   how many steps each picture was taken, integers), `delays` (how long each is shown, in
-#'   hundredths of a second, integers; the last for a second), `size` (width and height in pixels)
-#'   and `stills`, the frames of a filmstrip.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, a rollout
-#'   without frames, an environment that cannot be drawn, or when what writes the file is missing;
-#'   those of [rollout()] while it plays.
+#' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (the
+#'   number of steps before each frame, integers), `delays` (how long each is shown, in hundredths
+#'   of a second, integers; a second for the last), `size` (width and height in pixels) and
+#'   `stills`, the frames of a filmstrip.
+#' @section Errors: `gym_error_argument` for an invalid argument, a rollout without frames, an
+#'   environment that cannot be drawn, or if the software that writes the file is missing. Those of
+#'   [rollout()] while it plays.
 #' @seealso [plot.gym_rollout()] for a filmstrip on paper.
 #' @export
 #' @examplesIf gym:::can_start_server() && requireNamespace("magick", quietly = TRUE)
@@ -145,7 +144,7 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
 
 is_mp4 <- function(file) !is.null(file) && endsWith(lower_case(file), ".mp4")
 
-#' Take the frames of an episode out of a rollout
+#' Get the frames of an episode of a rollout
 #' @noRd
 episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_env()) {
   row <- episode_row(x, episode, candidate, call)
@@ -164,7 +163,7 @@ new_animation <- function(frames, file, fps, width, every) {
   video <- is_mp4(file)
   plan <- animation_plan(length(frames), fps, every, if (video) Inf else fastest_fps)
   pngs <- unclass(frames)[plan$steps + 1L]
-  # An interrupt leaves a file that was there before as it was.
+  # An interrupt leaves an existing file as it was.
   written <- temporary_file(fileext = if (video) ".mp4" else ".gif")
   size <- if (video) {
     write_mp4(pngs, written, fps / (every %||% 1), width)
@@ -207,7 +206,7 @@ animation_plan <- function(n, fps, every = NULL, fastest = fastest_fps) {
 # Browsers slow down animations with more frames a second.
 fastest_fps <- 50
 
-# Every how many frames one is shown: at least so many that the pace can be kept.
+# Show one in this many frames: at least so many that the speed can be kept.
 shown_every <- function(every, fps, fastest) {
   least <- max(1, ceiling(fps / fastest))
   if (!is.null(every) && every < least) {
@@ -263,8 +262,8 @@ format.gym_animation <- function(x, ...) {
   )
 }
 
-# The file gets knitr's name for it, in the folder of the document's figures. LaTeX cannot show it,
-# so there it is a filmstrip.
+# The file gets knitr's name, in the folder of the document's figures. LaTeX cannot show it, so it
+# gets a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
   hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)

@@ -48,9 +48,9 @@
 #' * `gym_error_http_400` for an unknown id (the hint lists similar ones), for arguments that the
 #'   environment does not have (code `invalid_kwargs`), for a forbidden wrapper (code
 #'   `wrapper_not_allowed`; the hint lists the allowed ones), for a `vectorization_mode` that does
-#'   not support the other arguments, or workers that cannot make the environment (code
-#'   `not_supported`; the hint names alternatives), or if a part of the server is not installed (code
-#'   `missing_dependency`; the hint says how to install it).
+#'   not support the other arguments, or worker processes that cannot make the environment (code
+#'   `not_supported`; the hint names alternatives), or if a part of the server is not installed
+#'   (code `missing_dependency`; the hint says how to install it).
 #' * `gym_error_http_429` for more sub-environments than the server allows (code
 #'   `too_many_sub_envs`), if it has no room for more environments or processes (codes
 #'   `too_many_instances`, `too_many_processes`), or if the environment would need more memory than

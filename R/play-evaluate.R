@@ -1,25 +1,24 @@
 #' Evaluate policies
 #'
-#' Plays each policy in the same number of episodes and gives its mean return, with how sure that
-#' is. Nothing is kept of single episodes: for these see [rollout()], which plays them.
+#' Play each policy in the same number of episodes and return its mean return with a confidence
+#' interval. The single episodes are not kept; use [rollout()] to get them.
 #'
-#' All candidates play the same episodes, so that luck favours none of them; but where R steps
+#' All candidates play the same episodes, so none is favoured by luck. The exception is R stepping
 #' sub-environments that share a seed (see [as_vector_env()]).
 #'
 #' @inheritParams rollout
-#' @param policy The policy: as for [rollout()] one, a list of several, or [policy_candidates()].
-#' @param episodes How many episodes to play with each policy, a whole number of at least 1; the
-#'   default is 100.
-#' @param level The confidence level of the interval, a number between 0 and 1; the default is
-#'   0.95.
-#' @return A data frame of class `gym_evaluation` with one row for each policy, in which
-#'   `candidate` is its number (integer), `mean_return` the mean of its episodes' returns, `se` the
-#'   standard error of this mean, `lower` and `upper` the bounds of the confidence interval
-#'   (doubles, `NA` for a single episode), `episodes` and `steps` how many were played (integers).
-#'   Names of policies in a list, or of rows of weights, are the names of rows.
-#' @section Errors: As [rollout()].
+#' @param policy As for [rollout()]: one policy, a list of several, or [policy_candidates()].
+#' @param episodes The number of episodes for each policy, a whole number of at least 1. The default
+#'   is 100.
+#' @param level The confidence level of the interval, a number between 0 and 1. The default is 0.95.
+#' @return A data frame of class `gym_evaluation` with one row for each policy. `candidate` is its
+#'   number (integer), `mean_return` the mean return of its episodes, `se` the standard error of
+#'   this mean, `lower` and `upper` the bounds of the confidence interval (doubles, `NA` for a
+#'   single episode), `episodes` and `steps` the numbers played (integers). Rows have the names of
+#'   policies in a list, or of rows of weights.
+#' @section Errors: As for [rollout()].
 #' @references The interval is that of [stats::t.test()].
-#' @seealso [rollout()], [plot()][plot.gym_rollout()] of which compares policies in a picture.
+#' @seealso [rollout()]; its [plot()][plot.gym_rollout()] compares policies in a picture.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' follow_pole <- function(observation) as.integer(observation[, 3] > 0)
@@ -71,7 +70,7 @@ evaluate_episodes <- function(episodes, policy, level = 0.95) {
   mean_return <- column(function(own) mean(own$return), 0)
   se <- column(function(own) standard_error(own$return), 0)
   count <- column(nrow, 0L)
-  # Of a single episode there is no interval, and no quantile for one.
+  # A single episode has no interval, and no quantile for one.
   beyond <- se * stats::qt((1 + level) / 2, pmax(count - 1L, 1L))
   numbers <- as.integer(names(each))
   data.frame(
@@ -85,7 +84,7 @@ evaluate_episodes <- function(episodes, policy, level = 0.95) {
 #' @export
 print.gym_evaluation <- function(x, ...) {
   if (!all(evaluation_columns %in% names(x)) || is.null(attr(x, "env_id"))) {
-    # Somebody has chosen columns.
+    # The user has selected columns.
     return(invisible(NextMethod()))
   }
   cat(
@@ -112,7 +111,7 @@ interval_text <- function(x) {
 
 level_text <- function(level) paste0(format(100 * level), "%")
 
-# Prints a row for each candidate; of many those with the highest mean returns.
+# Prints a row for each candidate, or for the ones with the highest mean returns of many.
 print_candidates <- function(x, level = 0.95, most = 10L) {
   few <- nrow(x) <= most
   shown <- if (few) seq_len(nrow(x)) else order(-x$mean_return)[seq_len(most)]

@@ -1,130 +1,126 @@
 #' Play whole episodes
 #'
-#' Plays a policy in an environment for a number of episodes, and keeps what came of
-#' it. An environment named by its id is made for the purpose and closed
-#' afterwards, whatever happens; one made by [gym_make()] is left open, in its last
-#' episode.
+#' Play a policy in an environment for a number of episodes and return their results. An environment
+#' given by its id is made for the rollout and always closed afterwards. One made by [gym_make()]
+#' stays open, in its last episode.
 #'
-#' An episode's return is the sum of its rewards, its length the number of its
-#' steps. Everything that is drawn, the seeds of the episodes and the actions of a random policy,
-#' follows from one whole number, `seed`. Without one it is drawn from R's generator, which moves by
-#' this one draw only; so [set.seed()] fixes everything, too, but for a policy that is made in the
-#' call, whose weights are the caller's to draw.
+#' The return of an episode is the sum of its rewards, its length the number of its steps. One whole
+#' number, `seed`, determines all random numbers: the seeds of the episodes and the actions of a
+#' random policy. Without it, one seed is drawn from R's generator, so [set.seed()] fixes
+#' everything, too. (The weights of a policy made in the call are drawn separately.)
 #'
 #' # Two ways to play
 #'
 #' **Beside the environment**: the policy is sent to the server, whose processes play whole episodes
-#' with it. This is the way where the environment is named by its id (with arguments, and wrappers
-#' of [gym_wrap()]) and the policy is data: [policy_random()], [policy_network()],
-#' [policy_linear()], [policy_table()], [policy_candidates()] and lists of these. An episode then
-#' depends on the environment, the policy, its seed and `max_steps` alone, what its policy draws
-#' included: not on how many processes play, nor on what else is played.
+#' with it. This applies if the environment is given by its id (with arguments, and wrappers of
+#' [gym_wrap()]) and the policy is data: [policy_random()], [policy_network()], [policy_linear()],
+#' [policy_table()], [policy_candidates()] and lists of these. An episode, including the random
+#' numbers of its policy, then depends only on the environment, the policy, its seed and
+#' `max_steps`. The number of processes and the other episodes do not matter.
 #'
-#' **Step by step**, everything else: R is asked for the actions of each step. This is so for
-#' functions, models and other policies that only R can ask; for an environment that was made
-#' before, or that is written in R; with `frames = TRUE`; for wrappers that remember earlier
-#' episodes; where an episode might go on forever, as neither the environment nor `max_steps` limits
-#' it; where a vector implementation such as CartPole's is to play with another `num_envs` than 256;
-#' and on a server that is older than this package. Many episodes are played at once in
-#' sub-environments, but for frames, and the policy is asked about those that still run, so that a
-#' function gets fewer rows as the last of them end.
+#' **Step by step**: R chooses the actions of each step. This applies to everything else:
+#' * functions, models and other policies that only R can run,
+#' * an environment that was made before or is written in R,
+#' * `frames = TRUE`, and wrappers that remember earlier episodes,
+#' * episodes without a step limit, by the environment or `max_steps`,
+#' * a vector implementation such as CartPole's with a `num_envs` other than 256,
+#' * a server that is older than this package.
 #'
-#' [provenance()] names the way. `vignette("playing", package = "gym")` tells more, and how to begin
-#' an episode of the result again.
+#' Many episodes are played together in sub-environments, except with frames. The policy gets only
+#' the episodes that are still running, so a function gets fewer rows at the end.
+#'
+#' [provenance()] names the way. `vignette("playing", package = "gym")` has details, and explains
+#' how to start an episode of the result again.
 #'
 #' # Steps as arrays
 #'
-#' Those who write learners want the steps by time, of all sub-environments at once. With
-#' `steps = "arrays"` they are a list of arrays whose first dimension is the time and whose second
-#' are the sub-environments:
-#' * `observation` and, where asked for, `next_observation`: with the dimensions of an observation
-#'   after these two, such as 120 x 16 x 4,
-#' * `action`: with those of an action, none for a Discrete space,
+#' Learning algorithms often need the steps by time, for all sub-environments at once. With
+#' `steps = "arrays"` the result is a list of arrays. Their first dimension is the time and their
+#' second the sub-environment:
+#' * `observation` and, on request, `next_observation`: followed by the dimensions of an
+#'   observation, such as 120 x 16 x 4,
+#' * `action`: followed by the dimensions of an action, none for a Discrete space,
 #' * `reward` (double), `terminated`, `truncated` (logical), `episode` and, with several policies,
 #'   `candidate` (integer): matrices.
 #'
-#' A sub-environment's episodes follow one another. Where it has played fewer steps than another
-#' the arrays have `NA` after its last one. Tuple and Dict have a list with an array for each part;
-#' Sequence, Graph and OneOf have no arrays.
+#' The episodes of a sub-environment follow one another. If it has played fewer steps than another,
+#' its arrays end with `NA`. Tuple and Dict have a list with an array for each part. Sequence, Graph
+#' and OneOf have no arrays.
 #'
-#' @param env The environment: an id, such as `"CartPole-v1"` (perhaps with wrappers,
-#'   see [gym_wrap()]), or an environment made by [gym_make()], with sub-environments or without.
-#' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of
-#'   many observations that returns as many actions: for the usual environments a function of a
-#'   matrix with an observation in each row, one for each episode that still plays, see [act()];
-#'   [as_policy()] makes one of a fitted model. A training plays as its policy. Or several of them,
-#'   the candidates, which are played side by side: a list of policies, [policy_candidates()], or
-#'   trainings with several seeds.
-#' @param episodes How many episodes to play, with each of the candidates, a whole number of at
-#'   least 1; the default is 1.
-#' @param max_steps After how many steps to cut an episode short, a whole number of
-#'   at least 1. Such an episode counts as truncated. `NULL`, the default, leaves it
-#'   to the environment; most have a limit of their own, but without one a policy
-#'   that never fails plays forever. No episode goes on beyond the environment's own limit;
-#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` makes one with another.
-#' @param seed A whole number of at most 2^53 that fixes all that is drawn, whatever [RNGkind()] the
-#'   session has; the session's generator stays as it was. `NULL`, the default, draws one from the
-#'   session's generator.
-#' @param steps Keep each step as well? `FALSE`, the default, `TRUE` for a table, or `"arrays"`.
-#' @param client The client of the server where an environment named by its id is
-#'   made; the default is the session's own, [gym_client()].
-#' @param frames Keep pictures of the episodes as well? `FALSE`, the default, or `TRUE`, for
-#'   [animate()] and [plot(type = "filmstrip")][plot.gym_rollout()]: one before the first
-#'   step and one after each. Takes an environment that can be drawn, without sub-environments.
-#' @param ... The environment's own arguments, by name, such as `is_slippery = FALSE` for
-#'   FrozenLake, where it is named by its id.
-#' @param num_envs How many sub-environments to play in, a whole number, where the environment is
-#'   named by its id; beside the environment, over how many the column `sub_env` and arrays deal out
-#'   the episodes. `NULL`, the default, chooses, see [as_vector_env()].
-#' @param next_observation Keep the observation after each step as well, in columns whose names
-#'   begin with `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only where
-#'   steps are kept. It is the true one also where the step ended the episode.
+#' @param env The environment: an id, such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]), or
+#'   an environment made by [gym_make()], with or without sub-environments.
+#' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of many
+#'   observations that returns as many actions. For the usual environments that is a function of a
+#'   matrix with an observation in each row, one for each running episode, see [act()].
+#'   [as_policy()] makes a policy from a fitted model. A training plays as its policy. Or several
+#'   policies, the candidates, which are played together: a list of policies, [policy_candidates()],
+#'   or trainings with several seeds.
+#' @param episodes The number of episodes, for each candidate, a whole number of at least 1. The
+#'   default is 1.
+#' @param max_steps The number of steps after which an episode is cut off, a whole number of at
+#'   least 1. Such an episode counts as truncated. `NULL`, the default, leaves it to the
+#'   environment. In an environment without a limit, a policy that never fails plays forever. No
+#'   episode goes beyond the environment's own limit;
+#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` changes that limit.
+#' @param seed A whole number of at most 2^53 that fixes all random numbers, for any [RNGkind()] of
+#'   the session. The session's generator is left as it was. `NULL`, the default, draws a seed from
+#'   the session's generator.
+#' @param steps Keep each step? `FALSE`, the default, `TRUE` for a table, or `"arrays"`.
+#' @param client The client of the server that makes an environment given by its id. The default is
+#'   the session's client, [gym_client()].
+#' @param frames Keep frames of the episodes? `FALSE`, the default, or `TRUE`, for [animate()] and
+#'   [plot(type = "filmstrip")][plot.gym_rollout()]: one before the first step and one after each.
+#'   Requires an environment that can be drawn, without sub-environments.
+#' @param ... Arguments of the environment, by name, such as `is_slippery = FALSE` for FrozenLake,
+#'   if it is given by its id.
+#' @param num_envs The number of sub-environments, a whole number, if the environment is given by
+#'   its id. Beside the environment, the column `sub_env` and arrays distribute the episodes over so
+#'   many. `NULL`, the default, chooses, see [as_vector_env()].
+#' @param next_observation Keep the observation after each step, in columns whose names begin with
+#'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only with `steps`. At the
+#'   end of an episode it is that episode's last observation.
 #' @param progress Show a progress bar? By default in interactive sessions only.
-#' @param num_workers How many processes of the server run the sub-environments where R plays step
-#'   by step, a whole number; 0 for none but the server itself. What is played does not depend on
-#'   it. `NULL`, the default, lets the server choose, see [as_vector_env()]. Only where the
-#'   environment is named by its id and has no vector implementation of its own, such as CartPole
-#'   has. Beside the environment the server chooses.
-#' @return An object of class `gym_rollout`, which [print()], [summary()],
-#'   [plot()][plot.gym_rollout()] and [as.data.frame()] know; a list with the
-#'   elements
+#' @param num_workers The number of the server's processes that run the sub-environments if R plays
+#'   step by step, a whole number; 0 for none but the server itself. The result does not depend on
+#'   it. `NULL`, the default, lets the server choose, see [as_vector_env()]. Only if the environment
+#'   is given by its id and has no vector implementation of its own, as CartPole has. Beside the
+#'   environment the server always chooses.
+#' @return An object of class `gym_rollout`, with methods for [print()], [summary()],
+#'   [plot()][plot.gym_rollout()] and [as.data.frame()]. It is a list with the elements
 #'   \describe{
 #'     \item{episodes}{A data frame with one row for each episode: `candidate` (integer, with
-#'       several policies only; `episode` then counts those of each), `episode`, `seed`,
-#'       `sub_env` (integers; 1 where there are no sub-environments), `return` (double), `length`
-#'       (integer, in steps), `terminated` (logical: ended by the environment's own
-#'       rules), `truncated` (logical: cut short by a limit of steps; an episode that ends
-#'       by both at once is both where the limit is the environment's own).}
-#'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each
-#'       step: `candidate` as above, `episode`, `step` (integers), the observation that the action
-#'       was taken on (in columns named as in Gymnasium's documentation, such as `pole_angle`,
-#'       elsewhere `obs_1`, `obs_2`, ..., with the keys of a Dict such as
-#'       `obs_position_1`), `action` (or `action_1`, `action_2`, ...),
-#'       `reward` (double), `terminated`, `truncated` (logical), and with
+#'       several policies only; each candidate's `episode` starts at 1), `episode`, `seed`,
+#'       `sub_env` (integers; 1 without sub-environments), `return` (double), `length` (integer, in
+#'       steps), `terminated` (logical: ended by the environment's own rules), `truncated` (logical:
+#'       cut off by a step limit). Both are `TRUE` if an episode terminates at the environment's own
+#'       limit.}
+#'     \item{steps}{`NULL`, or with `steps = TRUE` a data frame with one row for each step:
+#'       `candidate` as above, `episode`, `step` (integers), the observation before the action (in
+#'       columns named as in Gymnasium's documentation, such as `pole_angle`, otherwise `obs_1`,
+#'       `obs_2`, ..., with the keys of a Dict such as `obs_position_1`), `action` (or `action_1`,
+#'       `action_2`, ...), `reward` (double), `terminated`, `truncated` (logical), and with
 #'       `next_observation = TRUE` the observation after the step. With `steps = "arrays"` an object
 #'       of class `gym_arrays`, see below.}
 #'     \item{frames}{`NULL`, or with `frames = TRUE` a list with the frames of each episode, an
-#'       object of class `gym_frames`. They are kept as PNG files, a few kilobytes each:
-#'       `frames[[2]][[1]]` unpacks the first of the second episode, as [env_render()] gives
-#'       it (with package png).}
+#'       object of class `gym_frames`. They are kept as PNG files of a few kilobytes each.
+#'       `frames[[2]][[1]]` unpacks the first frame of the second episode in the form of
+#'       [env_render()] (with package png).}
 #'     \item{policy}{The policy played.}
 #'     \item{env_id}{The environment's id, a string.}
-#'     \item{num_envs}{How many sub-environments share the seed of an episode, an integer, of which
-#'       `sub_env` is one; `NULL` where each episode has a seed of its own.}
-#'     \item{seed}{The seed, as given or drawn: with it the same call gives the same result.}
-#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the episodes that were
-#'       finished; where R plays step by step, the batches of episodes.}
-#'     \item{provenance}{What [provenance()] tells.}
+#'     \item{num_envs}{The number of sub-environments that share the seed of an episode, an integer;
+#'       `sub_env` is one of them. `NULL` if each episode has its own seed.}
+#'     \item{seed}{The seed, as given or drawn. The same call with this seed gives the same result.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. An interrupted rollout has the
+#'       finished episodes, or, step by step, the finished batches of episodes.}
+#'     \item{provenance}{The result of [provenance()].}
 #'   }
-#'   `as.data.frame()` gives the table of steps where there is one, otherwise that of
-#'   the episodes.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be
-#'   (before anything is made), a policy that does not fit the environment, or a function
-#'   that does not return one action for each observation;
-#'   `gym_error_http` when the server refuses the environment or an action;
-#'   `gym_error_connection` when it does not answer. An error in the middle has the class
-#'   `gym_error_rollout`, too, and the episodes (step by step the batches of episodes) before it are
-#'   the element `result` of the condition.
+#'   `as.data.frame()` returns the table of steps if there is one, otherwise that of the episodes.
+#' @section Errors: `gym_error_argument` for an invalid argument (before anything is made), a policy
+#'   that does not fit the environment, or a function that does not return one action for each
+#'   observation. `gym_error_http` if the server refuses the environment or an action.
+#'   `gym_error_connection` if it does not answer. An error during play also has the class
+#'   `gym_error_rollout`, and its field `result` has the finished episodes (step by step, the
+#'   finished batches of episodes).
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export
@@ -277,7 +273,7 @@ as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...
 }
 
 #' @rdname rollout
-#' @param object What `rollout()` returned.
+#' @param object The result of `rollout()`.
 #' @param newdata,type As for [predict()][predict.gym_policy()] of a policy.
 #' @export
 predict.gym_rollout <- function(object, newdata, type = c("action", "output"), ...) {
@@ -319,15 +315,14 @@ returns_text <- function(returns) {
 
 #' Summarise a rollout
 #'
-#' @param object What [rollout()] returned.
+#' @param object The result of [rollout()].
 #' @param ... Not used.
-#' @return An object of class `summary.gym_rollout`, a list with the elements
-#'   `env_id` (a string), `policy`, `episodes` and `steps` (how many, integers),
-#'   `returns` and `lengths` (the quartiles and the mean, named numeric vectors of
-#'   length 6), `mean` and `se` (the mean return and its standard error, doubles; the
-#'   latter `NA` for a single episode), `terminated` and `truncated` (how many
-#'   episodes ended so, integers), `candidates` (`NULL`, or of several policies a row for each, as
-#'   [evaluate_policy()] has it).
+#' @return An object of class `summary.gym_rollout`, a list with the elements `env_id` (a string),
+#'   `policy`, `episodes` and `steps` (their numbers, integers), `returns` and `lengths` (the
+#'   quartiles and the mean, named numeric vectors of length 6), `mean` and `se` (the mean return
+#'   and its standard error, doubles; `se` is `NA` for a single episode), `terminated` and
+#'   `truncated` (the numbers of episodes, integers), `candidates` (`NULL`, or for several policies
+#'   a row for each, as in [evaluate_policy()]).
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))
@@ -376,5 +371,5 @@ quartiles <- function(x) {
     `3rd Qu.` = five[[4L]], Max. = five[[5L]])
 }
 
-# NA for a single episode, which has no standard error.
+# NA for a single episode.
 standard_error <- function(x) stats::sd(x) / sqrt(length(x))

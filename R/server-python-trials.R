@@ -6,8 +6,8 @@
 #' @param pythons Paths of Pythons, a character vector.
 #' @param timeout The time for all of them together, in seconds.
 #' @return A data frame with one row for each: `python`, `version` (a string or `NA`), `runs`
-#'   (logical, `NA` when it did not answer in time), `reason` (why it cannot run the
-#'   server, a string or `NA`) and `extras` (those of the server that it has, separated by ", ").
+#'   (logical, `NA` if it did not answer in time), `reason` (why it cannot run the server, a string
+#'   or `NA`) and `extras` (the server's extras that it has, separated by ", ").
 #' @noRd
 try_pythons <- function(pythons, timeout = 6) {
   trials <- lapply(pythons, begin_trial)
@@ -22,12 +22,12 @@ try_pythons <- function(pythons, timeout = 6) {
   )
 }
 
-# What each extra of the server installs.
+# The packages of each extra of the server.
 extra_modules <- c(
   box2d = "Box2D", mujoco = "mujoco", atari = "ale_py", atari = "cv2", video = "moviepy"
 )
 
-# Python 2 has no `find_spec`, and its version must be printed all the same.
+# Python 2 has no `find_spec`, and its version must still be printed.
 print_version <- paste0(
   "import sys; print('%d.%d.%d' % tuple(sys.version_info[:3])); sys.stdout.flush(); ",
   "import importlib.util as util; ",

@@ -1,8 +1,9 @@
 #' Train an agent
 #'
-#' Asks the agent for candidates, plays each of them, and tells it what came of it, iteration after
-#' iteration, until the target is reached or the budget used up. A learner such as [agent_q()] has
-#' no candidates: it plays the episodes of an iteration itself, and learns from each step.
+#' Train an agent iteration by iteration: the agent asks for candidates, they are played, and the
+#' agent gets the results. Training ends when the target is reached or the budget is used up. A
+#' learner such as [agent_q()] has no candidates. It plays the episodes of an iteration and learns
+#' from each step.
 #'
 #' # When training ends
 #'
@@ -17,13 +18,13 @@
 #' Where episodes have no limit of steps, neither the environment's nor `max_steps`, the policy is
 #' not evaluated before the first iteration: untrained, it might never end an episode.
 #'
-#' A learner's policy is calculated instead of played where the model of the environment is known
-#' ([env_model()]). These evaluations are exact; they have 0 episodes and a standard error of 0.
+#' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
+#' exactly, without playing. These evaluations have 0 episodes and a standard error of 0.
 #'
 #' # Targets
 #'
-#' The target of an environment is the reward threshold that Gymnasium registers, or that an
-#' environment in R was given, but for these four:
+#' The target of an environment is its reward threshold, as registered by Gymnasium or set in R,
+#' with four exceptions:
 #'
 #' | environment | target | where it comes from |
 #' |---|---|---|
@@ -37,33 +38,33 @@
 #'
 #' # Sampling from a model
 #'
-#' FrozenLake, CliffWalking and Taxi have a model. A learner that names one of them by its id gets
-#' the model from the server once and samples from it in R, with the same distribution and many
-#' times as fast, and a message says so. It plays on the server with `model = FALSE`, and wherever
+#' FrozenLake, CliffWalking and Taxi have a model. A learner of one of them, given by its id, gets
+#' the model from the server once and samples from it in R. The distribution is the same and the
+#' speed many times higher. A message says so. It plays on the server with `model = FALSE`, and if
 #' the environment itself is needed: with `mask`, `callback` or `num_workers`, with wrappers or a
-#' `render_mode`, on a lake whose map is drawn, and in a Taxi with a fickle passenger. A model
-#' without a limit of steps, such as that of CliffWalking, needs `max_steps`.
+#' `render_mode`, on a lake with a random map, and in a Taxi with a fickle passenger. A model
+#' without a step limit, such as CliffWalking's, requires `max_steps`.
 #'
-#' # Going on
+#' # Resuming
 #'
-#' With `checkpoint` the training is kept in a file, after each iteration or, where these are short,
-#' so often that it takes a tenth of the time at most. The same call goes on from there, to the same
-#' result as an uninterrupted training; one that had ended is returned at once. `iterations` and
-#' `total_steps` may differ then, but not those of a search. (A network of given sizes has drawn its
-#' weights before: make it after [set.seed()], or with the sizes `NA`, or it is another policy in
-#' the next session.)
+#' `checkpoint` keeps the training in a file. It is written after each iteration, or less often if
+#' iterations are short, so that it takes at most a tenth of the time. The same call resumes the
+#' training, with the same result as an uninterrupted one. A finished training is returned at once.
+#' `iterations` and `total_steps` may differ, except in a search. (A network with given sizes has
+#' already drawn its weights. Make it after [set.seed()] or with the sizes `NA`. Otherwise it is
+#' another policy in the next session.)
 #'
 #' # The tutorial's rule
 #'
 #' `solved_by = "candidate"` is the rule of the tutorial *Artificial Intelligence in R (I)* (2018).
-#' Nothing is evaluated: the candidates of [agent_random()] are judged one after the other, each by
-#' its own `episodes`, and the first whose mean return reaches the target ends the training. Each of
-#' them is an iteration, called a round. As none depends on another they are played side by side, as
-#' many as a batch of episodes has room for. The result has the class [gym_search], too.
-#' [search_random()] trains in this way.
+#' There are no evaluations. The candidates of [agent_random()] are judged one after the other by
+#' their own `episodes`. The first one whose mean return reaches the target ends the training. Each
+#' candidate is an iteration, called a round. Rounds are independent, so as many as fit into a batch
+#' of episodes are played in parallel. The result also has the class [gym_search]. [search_random()]
+#' trains in this way.
 #'
-#' @param agent The agent, as [agent_ars()], [agent_ppo()] or [agent_q()] make it, or one of your
-#'   own, see [agent_ask()].
+#' @param agent The agent, made by a function such as [agent_ars()], [agent_ppo()] or [agent_q()],
+#'   or your own, see [agent_ask()].
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy whose weights are to be found: a network, by default
 #'   [policy_linear()], or the one that an agent's help page tells. Most agents begin with the
@@ -108,51 +109,51 @@
 #'   has left there keeps its rows as `progress-1.csv`, and so on.
 #' @param checkpoint `NULL`, the default, or the file to keep the training in, such as
 #'   `"training.rds"`.
-#' @param resume Go on with what the file has, if it is there? `TRUE`, the default, or `FALSE`,
-#'   which begins anew and replaces it.
+#' @param resume Resume from the file if it exists? `TRUE`, the default, or `FALSE`, which starts
+#'   again and replaces it.
 #' @param progress Show a progress bar? By default in interactive sessions only.
-#' @param num_envs,num_workers How many sub-environments to play in, and how many processes run
-#'   them, as for [rollout()]. A learner plays in one unless more are given, see [agent_observe()].
-#' @param model Let a learner sample from the model in R where the environment, named by its id, has
-#'   one? `TRUE`, the default, or `FALSE`, which plays on the server. See below.
-#' @param client The client of the server where an environment named by its id is made; the default
-#'   is the session's own, [gym_client()].
-#' @return An object of class `gym_training`, which [print()], [summary()], [as.data.frame()],
-#'   [plot()][plot.gym_training()], [predict()], [coef()], [animate()] and [provenance()] know; with
-#'   `seeds` one of class [gym_trainings]. A training is a list with the elements
+#' @param num_envs,num_workers The number of sub-environments, and of processes that run them, as
+#'   for [rollout()]. A learner plays in one sub-environment by default, see [agent_observe()].
+#' @param model Let a learner sample from the model in R, if the environment is given by its id and
+#'   has one? `TRUE`, the default, or `FALSE`, which plays on the server. See below.
+#' @param client The client of the server that makes an environment given by its id. The default is
+#'   the session's client, [gym_client()].
+#' @return An object of class `gym_training`, with methods for [print()], [summary()],
+#'   [as.data.frame()], [plot()][plot.gym_training()], [predict()], [coef()], [animate()] and
+#'   [provenance()]; with `seeds`, one of class [gym_trainings]. A training is a list with the
+#'   elements
 #'   \describe{
-#'     \item{policy}{The agent's policy, with the weights that it has at the end, as it was
-#'       evaluated; `agent_policy(training$agent)` draws, where the agent's policy does.}
-#'     \item{agent}{The agent as it is at the end.}
-#'     \item{solved}{Whether a stopping evaluation, or a round by the tutorial's rule, has reached
-#'       the target, a logical.}
-#'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps`
-#'       (those of the training so far, double), `min_return`, `median_return`, `mean_return`,
-#'       `max_return` (of the candidates' mean returns, or of the returns where the agent learns
-#'       from steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean
-#'       return of the agent's policy, `NA` where it was not looked at), `elapsed` (seconds, `NA`
-#'       for the rounds of a search) and what [agent_log()] gives.}
+#'     \item{policy}{The agent's policy with its final weights, as it was evaluated.
+#'       `agent_policy(training$agent)` draws its actions if the agent's policy does.}
+#'     \item{agent}{The agent at the end.}
+#'     \item{solved}{Whether an evaluation during training, or a round by the tutorial's rule, has
+#'       reached the target, a logical.}
+#'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps` (of
+#'       the training so far, double), `min_return`, `median_return`, `mean_return`, `max_return`
+#'       (of the candidates' mean returns, or of the episodes' returns if the agent learns from
+#'       steps, double), `mean_length` (of their episodes, in steps), `evaluation` (the mean return
+#'       of the agent's policy, `NA` without an evaluation), `elapsed` (seconds, `NA` for the rounds
+#'       of a search) and the values of [agent_log()].}
 #'     \item{evaluations}{A data frame with a row for each evaluation: `iteration` (0 before the
-#'       first), `kind`
-#'       (`"curve"`, `"stopping"` or `"final"`), and the columns of [evaluate_policy()] from
-#'       `mean_return` on.}
-#'     \item{final}{The last of these rows, the final evaluation. `NULL` where training was
-#'       interrupted, and for a search.}
+#'       first), `kind` (`"curve"`, `"stopping"` or `"final"`), and the columns of
+#'       [evaluate_policy()] from `mean_return` on.}
+#'     \item{final}{The last of these rows, the final evaluation. `NULL` for an interrupted training
+#'       and for a search.}
 #'     \item{target, env_id, seed}{As given, found or drawn.}
 #'     \item{env}{The environment as given: its id, or the object.}
-#'     \item{kwargs}{The environment's own arguments, a named list.}
-#'     \item{provenance}{What [provenance()] tells.}
+#'     \item{kwargs}{The arguments of the environment, a named list.}
+#'     \item{provenance}{The result of [provenance()].}
 #'     \item{rules}{The budget and the rules of evaluation, a list of the arguments `iterations`,
 #'       `total_steps`, `max_steps`, `eval_every`, `eval_episodes`, `eval_episodes_curve` and
 #'       `evaluate`.}
-#'     \item{steps, elapsed}{All steps of the training, and its seconds, doubles.}
-#'     \item{interrupted}{Whether it was interrupted, a logical. Then it has the iterations that
-#'       were finished.}
+#'     \item{steps, elapsed}{The number of steps and of seconds of the training, doubles.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. An interrupted training has the
+#'       finished iterations.}
 #'   }
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a policy
-#'   that does not fit; `gym_error_checkpoint` for a file that cannot be gone on with. An error in
-#'   the middle has the class `gym_error_training`, too (and `gym_error_search` by the tutorial's
-#'   rule), and the iterations before it are the element `result` of the condition.
+#' @section Errors: `gym_error_argument` for an invalid argument, or a policy that does not fit.
+#'   `gym_error_checkpoint` for a file that cannot be resumed from. An error during training also
+#'   has the class `gym_error_training` (and `gym_error_search` by the tutorial's rule), and its
+#'   field `result` has the finished iterations.
 #' @seealso [evaluate_policy()], [rollout()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -188,7 +189,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
     max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes,
     evaluate = check_choice(evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
     eval_episodes_curve = eval_episodes_curve, seed = seed, callback = callback,
-    # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
+    # By the tutorial's rule the training is a search, and each candidate is an iteration, a round.
     search = solved_by == "candidate",
     may_sample = online && model
   )
@@ -229,7 +230,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
 
 least_sub_envs <- 100
 
-# However few episodes an evaluation has, candidates are played side by side.
+# Candidates are played in parallel even if an evaluation has few episodes.
 with_training_env <- function(settings, use, max_steps, client, call) {
   episodes <- if (settings$search) {
     as.numeric(settings$iterations %||% least_sub_envs) * settings$episodes
@@ -263,7 +264,7 @@ with_training_env <- function(settings, use, max_steps, client, call) {
   ))
 }
 
-# How many candidates an agent asks for in an iteration, where it is one of ours; else 0.
+# The number of candidates per iteration for agents of this package; otherwise 0.
 iteration_candidates <- function(agent) {
   switch(class(agent)[[1L]],
     gym_agent_ars = 2L * agent$directions,
@@ -274,8 +275,8 @@ iteration_candidates <- function(agent) {
 }
 
 #' Prepare a run: one training, with its seed and its files
-#' @param files A list of `checkpoint`, `log` and `resume`, as [train_agent()] takes them.
-#' @return A list: `settings`, `file`, as [open_checkpoint()] returns it (`NULL` for none), and
+#' @param files A list of `checkpoint`, `log` and `resume`, as for [train_agent()].
+#' @return A list: `settings`, `file`, as returned by [open_checkpoint()] (`NULL` for none), and
 #'   `log`, the folder.
 #' @noRd
 new_run <- function(settings, files, call) {
@@ -288,13 +289,13 @@ new_run <- function(settings, files, call) {
   list(settings = settings, file = file, log = files$log)
 }
 
-# One that had ended needs no environment.
+# A finished training does not need an environment.
 do_run <- function(run, in_env, max_steps, client, progress, call) {
   finished <- if (!is.null(run$file$saved)) finished_training(run, client)
   finished %||% in_env(function(vector_env) train_in(vector_env, run, progress, call), max_steps)
 }
 
-# Trains in an environment that was made.
+# Trains in a given vector environment.
 train_in <- function(vector_env, run, progress, call) {
   settings <- run$settings
   settings["target"] <- list(training_target(settings, vector_env$spec))
@@ -318,8 +319,7 @@ train_in <- function(vector_env, run, progress, call) {
   run_training(state, vector_env, settings, progress, call)
 }
 
-# A learner explores, so that it comes to wherever a model leads; but not one that is given its
-# policy.
+# A learner explores, so it reaches all states of a model. With a given policy it may not.
 check_training_ends <- function(vector_env, settings, online, call) {
   check_has_end(vector_env, settings$max_steps %||% Inf)
   model <- settings$model
@@ -338,11 +338,11 @@ check_training_ends <- function(vector_env, settings, online, call) {
   }
 }
 
-# Weights that are drawn when the environment's sizes are known follow from the training's seed: a
-# policy that draws them is drawn anew.
+# Weights that are drawn when the environment's sizes become known depend on the training's seed, so
+# a policy that draws them is drawn again.
 bind_with_seed <- function(policy, vector_env, seed, call) {
   if (!is.null(policy$weights_seed)) {
-    # A stream that nothing else draws from: the agent's first draws must not be the weights.
+    # Its own stream: the agent's first random numbers must not equal the weights.
     own <- new_generator(stream = parallel::nextRNGSubStream(seed_stream(seed)))
     policy$weights_seed <- with_generator(own, draw_seed())
   }
@@ -384,7 +384,7 @@ check_training <- function(settings, call) {
   }
 }
 
-# It would be taken for one of the environment's own arguments.
+# Otherwise it would be taken for an argument of the environment.
 check_no_steps <- function(names, call) {
   if ("steps" %in% names) {
     gym_abort(
@@ -395,8 +395,8 @@ check_no_steps <- function(names, call) {
   }
 }
 
-# An argument that is misspelt would be taken for one of the environment's own. One that only
-# resembles another may be that: it is refused where training cannot begin anyway.
+# A misspelt argument would be taken for one of the environment. A name that only resembles another
+# may really be one: it is refused only if training cannot start anyway.
 check_spelling <- function(names, choices, can_begin, call) {
   for (name in names) {
     near <- nearest_name(name, choices)

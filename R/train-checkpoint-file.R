@@ -1,11 +1,10 @@
-# The file of a checkpoint: it is read completely or not at all, and written completely or
-# not at all.
+# The file of a checkpoint. It is read and written completely or not at all.
 
 # The version of the file's format. Files with another version are refused.
 checkpoint_format <- 8L
 
 #' Read the file of a training
-#' @return What [training_checkpoint()] wrote, `NULL` where there is no file.
+#' @return The value written by [training_checkpoint()], `NULL` if there is no file.
 #' @noRd
 read_checkpoint <- function(path, call) {
   if (!file.exists(path)) {
@@ -30,8 +29,8 @@ read_checkpoint <- function(path, call) {
   unserialize(file$state)
 }
 
-# Removes what a process that was killed while writing has left. A file of the last ten minutes may
-# be one that another process is writing.
+# Removes what a process that was killed while writing has left. Another process may still be
+# writing a file from the last ten minutes.
 remove_parts <- function(path) {
   files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
   parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
@@ -50,40 +49,40 @@ write_checkpoint <- function(path, state) {
   replace_content(path, serialize(file, NULL))
 }
 
-#' Replace what a file holds, completely or not at all
+#' Replace the content of a file, completely or not at all
 #'
-#' It is written beside the file that is there, and then replaces it by a rename.
+#' The new file is written beside the old one and then renamed.
 #' @param bytes A raw vector.
 #' @noRd
 replace_content <- function(path, bytes) {
-  # The name is this process's own, because another process may write the same file.
+  # The name is unique to this process, because another one may write the same file.
   part <- tempfile(paste0(basename(path), "-", Sys.getpid(), "-"), dirname(path), ".part")
   on.exit(unlink(part))
   write_bytes(part, bytes, "wb")
   replace_file(part, path)
 }
 
-# Writes bytes to a file, or behind what it has: `mode` is "wb" or "ab".
+# Writes bytes to a file, or appends them: `mode` is "wb" or "ab".
 write_bytes <- function(path, bytes, mode) {
   before <- if (mode == "ab" && file.exists(path)) file.size(path) else 0
-  # It is made before it is opened: what cannot be opened would stay among R's connections.
+  # Create the connection before opening it: one that cannot be opened would stay open in R.
   connection <- file(path, raw = TRUE)
   tryCatch(
     {
       open(connection, mode)
       writeBin(bytes, connection)
     },
-    # The warning says more than the error that follows.
+    # The warning says more than the error that follows it.
     warning = function(cnd) stop(conditionMessage(cnd), call. = FALSE),
     finally = suppressWarnings(close(connection))
   )
-  # Closing a file does not always fail when the disk is full.
+  # Closing a file does not always fail if the disk is full.
   if (!identical(file.size(path), before + length(bytes))) {
     stop("not all of it could be written", call. = FALSE)
   }
 }
 
-# On Windows a file that somebody reads, such as a virus scanner, cannot be replaced just then.
+# On Windows a file cannot be replaced while another program, such as a virus scanner, reads it.
 replace_file <- function(from, to) {
   for (attempt in 1:20) {
     if (suppressWarnings(file.rename(from, to))) {
@@ -96,16 +95,15 @@ replace_file <- function(from, to) {
 
 # Writing again and again --------------------------------------------------------------
 
-# After the file was written it is left as it is for nine times as long as that took: so writing
-# takes a tenth of the time at most.
+# After each write, wait for nine times as long as it took: writing then takes at most a tenth of
+# the time.
 rest_per_writing <- 9
 
 #' Prepare to write a file from time to time
-#' @param checkpoint As [open_checkpoint()] returns it. Where there is no file yet it is written
-#'   now.
-#' @param state A function that returns what to write.
+#' @param checkpoint As returned by [open_checkpoint()]. If there is no file yet, it is written now.
+#' @param state A function that returns the value to write.
 #' @param what What is kept, `"search"` or `"training"`.
-#' @return A function that writes the file where `now` is `TRUE`, or it has rested for long enough.
+#' @return A function that writes the file if `now` is `TRUE` or the waiting time is over.
 #' @noRd
 checkpoint_writer <- function(checkpoint, state, what, call) {
   path <- checkpoint$path
@@ -142,7 +140,7 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
     tryCatch(
       write(),
       error = function(cnd) {
-        # A full disk must not end what has played for hours.
+        # A full disk must not end hours of playing.
         if (!failed) warn_not_written(path, what, cnd)
         failed <<- TRUE
       }
@@ -152,11 +150,11 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
   }
 }
 
-# What changes when another process replaces a file.
+# These values change when another process replaces a file.
 file_mark <- function(path) as.list(file.info(path)[c("size", "mtime", "ctime")])
 
-# Whether the file is one that another process has written meanwhile, and that must be kept. Returns
-# whose it is, in words, NULL where ours may take its place.
+# Whether another process has written the file meanwhile and its version must be kept. Returns a
+# description of the owner, or NULL if our version may replace it.
 overtaken_by <- function(path, own, what) {
   there <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
   if (is.null(there)) {

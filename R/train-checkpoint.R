@@ -1,21 +1,21 @@
-# A training keeps what it has come to in a file, the checkpoint, from which it can go on after it
-# was ended. How that file is read and written stands in train-checkpoint-file.R.
+# A training keeps its state in a file, the checkpoint, from which it can be resumed.
+# train-checkpoint-file.R reads and writes the file.
 
 kept_of_training <- c(
   "agent", "iteration", "steps", "history", "evaluations", "episodes", "final", "solved", "ended"
 )
 
-#' Look into the file of a training, and prepare to keep it there
+#' Read the checkpoint of a training and prepare to update it
 #'
 #' @param path The file.
-#' @param arguments What fixes it, a list, in which the file must agree.
-#' @param resume Whether to go on with what the file has.
+#' @param arguments The arguments that must be the same as in the file, a list.
+#' @param resume Whether to resume from the file.
 #' @param what What is kept, `"search"` or `"training"`.
-#' @return A list: `path`, `arguments`, `saved`, what the file has, `NULL` where there is none to
-#'   go on with, and `mark`, by which the file is known again.
+#' @return A list: `path`, `arguments`, `saved`, the content of the file, `NULL` if there is nothing
+#'   to resume, and `mark`, which identifies this version of the file.
 #' @noRd
 open_checkpoint <- function(path, arguments, resume, what, call) {
-  # The file that a link leads to is replaced, not the link.
+  # Replace the target of a link, not the link.
   path <- normalizePath(absolute_path(path), mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
     problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
@@ -33,20 +33,20 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
   list(path = path, arguments = arguments, saved = saved, mark = mark)
 }
 
-#' Go on from a training's file, and keep the training in it from now on
+#' Resume from a training's file, and keep the training in it from now on
 #'
-#' The file grows, and where iterations are short writing might take longer than playing: then it is
-#' not written after each, and those since the last time would be played again.
-#' @param file As [open_checkpoint()] returns it.
+#' The file grows. If iterations are short, writing may take longer than playing. The file is then
+#' not written after each iteration, and those since the last write would be played again.
+#' @param file As returned by [open_checkpoint()].
 #' @return A function that is called after each iteration, and at the end with `last = TRUE`.
 #' @noRd
 training_checkpoint <- function(state, file, settings, call) {
-  # What the server decides, beside the arguments.
+  # In addition to the arguments: the settings that the server determines.
   server <- settings[c("target", "env_id", "num_envs", "batch_size", "from_model")]
   if (!is.null(file$saved)) {
     check_same_server(file$path, file$saved$server, server, call)
     resume_training(state, file$saved, file$path, call)
-    # Where the budget is a larger one now, the final evaluation comes later.
+    # With a larger budget the final evaluation comes later.
     state$final <- NULL
     state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
     played <- played_text(settings, state)
@@ -76,9 +76,9 @@ resume_training <- function(state, saved, path, call = NULL) {
   state$started <- state$started - saved$elapsed
 }
 
-#' Make the result of a training whose file says that it had ended
-#' @param client The client that the result of a search names.
-#' @return A training; `NULL` where there is something to play.
+#' Make the result of a training that has already ended
+#' @param client The client for the result of a search.
+#' @return A training; `NULL` if there is something left to play.
 #' @noRd
 finished_training <- function(run, client) {
   saved <- run$file$saved
@@ -110,8 +110,8 @@ inform_resumed <- function(text, .envir = parent.frame()) {
 
 # The same training --------------------------------------------------------------------
 
-# What must be the same in two runs of one training. The budget may be another, but for a search,
-# whose rounds are cut into batches by it.
+# The arguments that must be the same in two runs of one training. The budget may differ, except in
+# a search, because it determines how rounds are divided into batches.
 training_arguments <- function(settings) {
   numbers <- c(
     "episodes", "target", "max_steps", "eval_every", "eval_episodes", "eval_episodes_curve", "seed"
@@ -144,14 +144,14 @@ environment_traits <- function(env) {
   }
 }
 
-# Where its settings come from makes no difference.
+# The source of its settings makes no difference.
 comparable_agent <- function(agent) {
   agent$preset <- NULL
   agent
 }
 
-# The seed of weights that are not drawn yet is the training's own. An agent that draws all weights
-# makes no use of those that the policy has: what is drawn from the policy is compared.
+# The training's seed determines weights that are not drawn yet. An agent that draws all weights
+# ignores those of the policy, so the distribution is compared.
 comparable_policy <- function(policy, agent) {
   if (inherits(agent, "gym_agent_random")) {
     policy <- with_generator(new_generator(1), policy_resample(policy))
@@ -191,7 +191,7 @@ argument_text <- function(name, value) {
   )
 }
 
-# Another server may run the sub-environments in another way, and with it play other episodes.
+# Another server may run the sub-environments in another way, and then plays other episodes.
 check_same_server <- function(path, there, now, call) {
   names <- c(
     target = "the environment's reward threshold", env_id = "the environment",

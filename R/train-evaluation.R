@@ -1,13 +1,13 @@
 # When training ends, and the evaluations of the agent's own policy.
 
-# Seeds of episodes: those of training are up to this number, those of evaluations above it; of
-# these the final evaluation has the upper half. So an evaluation plays no episode that the training
-# has seen, and the final one none that any has.
+# Seeds of episodes: training uses those up to this number, evaluations those above it, of which the
+# final evaluation has the upper half. So an evaluation plays no episode of the training, and the
+# final one none of any other.
 last_training_seed <- 2^30
 
 draw_training_seeds <- function(n) sample.int(last_training_seed, n, replace = TRUE)
 
-# The targets that are not the environment's reward threshold; see ?train_agent.
+# Targets that differ from the environment's reward threshold; see ?train_agent.
 own_targets <- list(
   `HalfCheetah-v5` = 3430, `Hopper-v5` = 3120, `Pendulum-v1` = -200, `Swimmer-v5` = 325
 )
@@ -16,10 +16,10 @@ training_target <- function(settings, spec) {
   settings$target %||% own_targets[[spec$id]] %||% spec$reward_threshold
 }
 
-#' Does training end after the last iteration, because the target is reached?
+#' Has the training reached its target?
 #'
-#' The only place that sets `solved`. A search is solved by the round that reaches the target; later
-#' ones were not played. Otherwise a stopping evaluation decides.
+#' Only this function sets `solved`. A search is solved by the round that reaches the target; later
+#' ones were not played. Otherwise an evaluation decides.
 #' @noRd
 training_ends <- function(state, vector_env, settings) {
   reached <- reaches(state$history[[state$iteration]]$mean_return, settings$target)
@@ -37,7 +37,7 @@ training_ends <- function(state, vector_env, settings) {
   state$solved
 }
 
-# The untrained policy, where its episodes are sure to end.
+# The untrained policy, if its episodes are sure to end.
 evaluate_start <- function(state, vector_env, settings) {
   limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
   if (!settings$search && !state$iteration && !length(state$evaluations) && !is.null(limit)) {
@@ -50,8 +50,8 @@ evaluate_for_curve <- function(state, vector_env, settings) {
   if (episodes > 0) evaluate_agent(state, vector_env, settings, "curve", episodes)
 }
 
-#' Evaluate the agent's policy: in fresh episodes, or exactly where it is judged by a model
-#' @param kind What for: `"curve"`, `"stopping"` or `"final"`.
+#' Evaluate the agent's policy, in new episodes or exactly by a model
+#' @param kind The purpose: `"curve"`, `"stopping"` or `"final"`.
 #' @return A row of the training's evaluations.
 #' @noRd
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
@@ -70,7 +70,7 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   row
 }
 
-# The policy that is evaluated and returned. By the tutorial's rule a candidate was judged as it is.
+# The policy that is evaluated and returned. By the tutorial's rule a candidate is judged as it is.
 judged_policy <- function(settings, agent) {
   policy <- agent_policy(agent)
   greedy <- !settings$search && identical(settings$evaluate, "greedy")
@@ -79,8 +79,9 @@ judged_policy <- function(settings, agent) {
 
 play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {
   if (!is.null(vector_env$make_evaluated)) vector_env <- vector_env$make_evaluated()
-  # The final evaluation draws from copies: a training that goes on with a larger budget evaluates
-  # as one that had it from the start. So does the first one, which changes no later one.
+  # The final evaluation draws from copies: a training resumed with a larger budget then evaluates
+  # like one that had it from the start. So does the first evaluation, so that it does not change
+  # later ones.
   streams <- state$evaluation_streams
   if (final || !state$iteration) streams <- restore_streams(saved_streams(streams))
   half <- last_training_seed / 2

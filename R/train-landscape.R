@@ -1,58 +1,57 @@
 #' Play the networks around the best one
 #'
-#' Computes the landscape of a search: the mean return over a plane through the weights of
-#' the best policy, which lies in the middle. Each point of the plane is a network, and all
-#' of them play the same few episodes. [plot()][plot.gym_landscape()] shows it, which
-#' `plot(search, type = "landscape")` does in one call, playing anew each time.
+#' Compute the landscape of a search: the mean return over a plane through the weights of the best
+#' policy, which is in the middle. Each point of the plane is a network, and all networks play the
+#' same few episodes. [plot()][plot.gym_landscape()] shows the landscape.
+#' `plot(search, type = "landscape")` does both in one call, but plays every time.
 #'
 #' # The plane
 #'
-#' It is spanned by two random directions. In each, the weights that go into a neuron are
-#' scaled to be together as long as those of the best network, as Li et al. (2018) do with
-#' filters: so that a step of 1 changes each neuron as much as its own weights. Where a
-#' neuron has two inputs or more, the second direction is made perpendicular to the first. (In
-#' their networks of millions of weights any two directions nearly are, in small ones they are
-#' not.) A point at `a` and `b` has the best weights plus `a` times the first and `b` times the
-#' second direction. The standard deviations of a network that draws from a Gaussian are those of the
-#' best policy at each point.
+#' Two random directions span the plane. In each, the weights into a neuron are scaled to the length
+#' of those of the best network, as Li et al. (2018) do with filters. A step of 1 then changes each
+#' neuron as much as its own weights. If a neuron has two inputs or more, the second direction is
+#' perpendicular to the first. (In networks with millions of weights two random directions are
+#' nearly perpendicular; in small ones they are not.) The point `(a, b)` has the best weights plus
+#' `a` times the first and `b` times the second direction. A network with a Gaussian output keeps
+#' the standard deviations of the best policy at each point.
 #'
 #' # The same episodes
 #'
-#' All networks play episodes of the same seeds, so that neighbours differ by their
-#' weights and not by chance. Only where R steps sub-environments that share a seed
-#' (`"CartPole-v1"` that was made with `num_envs`, with its own vector implementation) different
-#' episodes are played for each network; the element `common` of the result is `FALSE` then.
+#' All networks play episodes with the same seeds, so that neighbours differ by their weights and
+#' not by chance. There is one exception: if R steps sub-environments that share a seed
+#' (`"CartPole-v1"` made with `num_envs`, by its own vector implementation), each network plays
+#' other episodes. The element `common` of the result is then `FALSE`.
 #'
-#' @param search A search, as [search_random()] returns it. An environment that was given to it
-#'   as an object has to be open still.
-#' @param size How many points the grid has in each direction, an odd whole number of at
-#'   least 3; the default is 21, which is 441 networks.
-#' @param span How far the plane reaches to each side of the middle, a number above 0 in
-#'   lengths of the best weights; the default is 1.
-#' @param episodes How many episodes each network plays, a whole number of at least 1; the
-#'   default is 5.
-#' @param seed A whole number that fixes directions and episodes and leaves the session's
-#'   generator as it was, or `NULL`, the default, to draw from the session's generator.
+#' @param search A search, as returned by [search_random()]. If it got the environment as an object,
+#'   that must still be open.
+#' @param size The number of points in each direction, an odd whole number of at least 3. The
+#'   default is 21, which gives 441 networks.
+#' @param span How far the plane reaches to each side of the middle, in lengths of the best weights,
+#'   a number above 0. The default is 1.
+#' @param episodes The number of episodes of each network, a whole number of at least 1. The default
+#'   is 5.
+#' @param seed A whole number that fixes directions and episodes and leaves the session's generator
+#'   as it was. `NULL`, the default, draws a seed from the session's generator.
 #' @param progress Show a progress bar? By default in interactive sessions only.
-#' @param client The client of the server where an environment named by its id is made; the
-#'   default is that of the search.
-#' @return An object of class `gym_landscape`, which [print()], [as.data.frame()] and
-#'   [plot()][plot.gym_landscape()] know; a list with the elements
+#' @param client The client of the server that makes an environment given by its id. The default is
+#'   the search's client.
+#' @return An object of class `gym_landscape`, with methods for [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_landscape()]. It is a list with the elements
 #'   \describe{
-#'     \item{grid}{A data frame with one row for each point: `a`, `b` (doubles, its coordinates)
-#'       and `mean_return` (double, `NA` where an interrupt came first). `as.data.frame()`
-#'       gives it.}
+#'     \item{grid}{A data frame with one row for each point: `a`, `b` (doubles, its coordinates) and
+#'       `mean_return` (double, `NA` if it was not played because of an interrupt).
+#'       `as.data.frame()` returns it.}
 #'     \item{best}{The mean return of the best policy in these episodes, a double.}
-#'     \item{directions}{The two directions, each a list of matrices as `weights` of a
-#'       [policy_network()].}
-#'     \item{policy, env_id, target}{The best policy and what it was found in.}
-#'     \item{episodes, seeds, common}{How many episodes each network played, an integer; their
+#'     \item{directions}{The two directions, each a list of matrices in the form of the `weights` of
+#'       a [policy_network()].}
+#'     \item{policy, env_id, target}{The best policy, and the environment and target of the search.}
+#'     \item{episodes, seeds, common}{The number of episodes of each network, an integer; their
 #'       seeds, integers; and whether they were the same for all, a logical.}
-#'     \item{elapsed, interrupted}{The seconds that it took, a double, and whether it was
-#'       interrupted, a logical: then the points played so far have a mean return.}
+#'     \item{elapsed, interrupted}{The time it took in seconds, a double, and whether it was
+#'       interrupted, a logical.}
 #'   }
-#' @section Errors: `gym_error_argument` when the search has no policy because it was ended
-#'   in its first round; those of [rollout()] while it plays.
+#' @section Errors: `gym_error_argument` if the search has no policy because it was stopped in its
+#'   first round. Those of [rollout()] while it plays.
 #' @references H. Li, Z. Xu, G. Taylor, C. Studer, T. Goldstein (2018): Visualizing the Loss
 #'   Landscape of Neural Nets. *Advances in Neural Information Processing Systems* 31.
 #' @export
@@ -103,7 +102,7 @@ draw_directions <- function(weights) {
   list(Map(as_long_as, first, weights), Map(as_long_as, second, weights))
 }
 
-# For each neuron, which is a row. Where a neuron has one input there is no perpendicular direction.
+# For each neuron (a row). A neuron with one input has no perpendicular direction.
 perpendicular <- function(layer, to) {
   if (ncol(layer) < 2L) {
     return(layer)
@@ -115,7 +114,7 @@ as_long_as <- function(direction, layer) {
   direction * (sqrt(rowSums(layer^2)) / sqrt(rowSums(direction^2)))
 }
 
-# A list: `grid`, the points, and `policy`, the networks at them as candidates.
+# A list: `grid`, the points, and `policy`, the networks at these points as candidates.
 new_plane <- function(policy, directions, size, span) {
   steps <- span * seq(-1, 1, length.out = size)
   # The middle is exactly the best policy, without a rounding error.
@@ -134,7 +133,7 @@ new_plane <- function(policy, directions, size, span) {
 
 # Playing it ----------------------------------------------------------------------
 
-#' Play the episodes of all points, side by side
+#' Play the episodes of all points in parallel
 #' @return As [search_landscape()].
 #' @noRd
 play_plane <- function(vector_env, plane, search, episodes, streams, progress) {

@@ -1,36 +1,38 @@
-#' Write a learner of your own
+#' Write your own learner
 #'
-#' A learner is an agent that learns from each step, and not from what whole episodes came to. It is
-#' a plain list with a class of its own before `"gym_learner"` and `"gym_agent"`, made by a function
-#' such as `agent_mean()` below, and plays and learns by two generics instead of [agent_ask()] and
-#' [agent_tell()]: it acts, the environment takes the step, it observes what came of it. (The
-#' learners of this package, such as [agent_q()], have quicker ways of their own.)
+#' A learner is an agent that learns from each step instead of whole episodes. It is a plain list
+#' with its own class before `"gym_learner"` and `"gym_agent"`, made by a function such as
+#' `agent_mean()` below. Instead of [agent_ask()] and [agent_tell()] it has two generics: it acts,
+#' the environment takes the step, and it observes the result. (The learners of this package, such
+#' as [agent_q()], have faster internal functions.)
 #'
-#' One learner can play several sub-environments side by side, all of which feed the same table
+#' One learner can play several sub-environments together, which all update the same table
 #' (`train_agent(num_envs = )`). Then `agent_observe()` gets several transitions at once. The
-#' learners of this package learn from them one after the other. What differs from one
-#' sub-environment is that the environment takes all of these steps before any has taught anything.
+#' learners of this package process them one after the other. The difference from one
+#' sub-environment is that the environment takes all these steps before the learner learns from any
+#' of them.
 #'
 #' @param agent The learner.
-#' @param observation The observations, a batch as a policy gets it; see [act()].
+#' @param observation The observations, a batch as for a policy; see [act()].
 #' @param sub_env The numbers of their sub-environments, integers.
-#' @param transitions What came of a step, a list with an element for each sub-environment in each
+#' @param transitions The results of a step, a list with an element for each sub-environment in each
 #'   of
 #'   \describe{
-#'     \item{observation, action}{What was observed and done, batches.}
+#'     \item{observation, action}{The observations and the actions, batches.}
 #'     \item{reward}{A numeric vector.}
-#'     \item{next_observation}{What the step led to, a batch: at the end of an episode its last
-#'       observation, never the first one of the next.}
+#'     \item{next_observation}{The observations after the step, a batch: at the end of an episode
+#'       its last observation, never the first one of the next.}
 #'     \item{terminated, truncated}{Whether the episode ended by the environment's own rules, or was
 #'       cut off, logical vectors. The value of `next_observation` counts after a truncation, and is
 #'       0 after a termination.}
 #'     \item{first}{Whether it was the first step of an episode, a logical vector.}
 #'     \item{sub_env}{The numbers of the sub-environments, integers.}
 #'   }
-#' @return `agent_act()` an action for each observation, `agent_observe()` the agent, wiser. Both
-#'   draw from R's generator, which training sets.
-#' @seealso [agent_start()], [agent_policy()], which a learner has methods of, too: `agent_start()`
-#'   gets the environment's spaces as `policy$observation_space` and `policy$action_space`.
+#' @return `agent_act()` returns an action for each observation, `agent_observe()` the updated
+#'   agent. Both draw from R's generator, which training sets.
+#' @seealso [agent_start()] and [agent_policy()]; a learner has methods for these, too.
+#'   `agent_start()` gets the environment's spaces as `policy$observation_space` and
+#'   `policy$action_space`.
 #' @export
 #' @examples
 #' # Keeps the mean reward of each action, whatever the state, and tries each 10 times.
@@ -69,8 +71,8 @@ agent_observe <- function(agent, transitions) UseMethod("agent_observe")
 
 learns_online <- function(agent) inherits(agent, "gym_learner")
 
-# A learner plays in one sub-environment unless more are asked for, but on a server not one that
-# learns between episodes. One that was made before has as many as it has.
+# By default a learner plays in one sub-environment, except one that learns between episodes on a
+# server. An environment that was made before keeps its number.
 learner_envs <- function(env, agent) {
   served <- is_made_by_server(env)
   if (served && !inherits(agent, "gym_agent_monte_carlo") || is_registered(env) ||
@@ -79,8 +81,8 @@ learner_envs <- function(env, agent) {
   }
 }
 
-# What a learner's `agent_start()` gets: a policy that was given, with the spaces, and with a model
-# which actions each state has.
+# The argument of a learner's `agent_start()`: the given policy, with the spaces, and with the
+# actions of each state if there is a model.
 spaces_policy <- function(policy, vector_env, model, call) {
   bound <- if (is.null(policy)) {
     structure(
@@ -99,8 +101,8 @@ format.gym_policy_unknown <- function(x, ...) "the learner's own"
 
 # Playing an iteration ----------------------------------------------------------------
 
-#' Let a learner play the episodes of an iteration, and learn on the way
-#' @return A list: `agent`, wiser, `returns` and `lengths` of the episodes.
+#' Let a learner play the episodes of an iteration, and learn during play
+#' @return A list: `agent`, updated, `returns` and `lengths` of the episodes.
 #' @noRd
 learn_episodes <- function(state, vector_env, settings, call) {
   learner <- state$learner
@@ -131,13 +133,13 @@ learn_episodes <- function(state, vector_env, settings, call) {
   c(list(agent = learner$export()), played)
 }
 
-# Whether a learner learns between episodes, and nothing but a policy is needed to play them.
+# Whether a learner learns between episodes, and they can be played with nothing but a policy.
 plays_whole <- function(agent) {
   inherits(agent, "gym_agent_monte_carlo") && !agent$exploring_starts && is.null(agent$mask) &&
     agent$importance == "none"
 }
 
-# Whether the server's processes play whole episodes for a learner, asked once for a training.
+# Whether the server's processes play whole episodes for a learner; asked once per training.
 learns_beside <- function(state, vector_env, settings) {
   state$beside <- state$beside %||% (plays_whole(state$agent) && plays_beside(
     vector_env, agent_policy(state$agent), settings$max_steps %||% Inf, keep_steps = TRUE
@@ -155,7 +157,7 @@ learn_beside <- function(learner, state, vector_env, settings) {
   check_rewards(reward, NULL)
   spaces <- state$agent$spaces
   observation <- bind_batches(spaces$observation_space, each("observation"))
-  # All at once: how the episodes were cut into requests must not change a sum's last bit.
+  # All at once: the division of episodes into requests must not change the last bit of a sum.
   learner$whole$learn(
     state$agent$basis$of(observation, length(reward))[, 1L],
     action_columns(spaces, unlist(each("action"))), reward, step_rows(batches)
@@ -179,7 +181,7 @@ learn_alone <- function(learner, state, vector_env, settings, call) {
   ))
 }
 
-# A learner that somebody else has written.
+# A learner written by a user.
 learn_by_methods <- function(state, vector_env, settings, call) {
   agent <- state$agent
   learner <- list(
@@ -194,7 +196,7 @@ learn_by_methods <- function(state, vector_env, settings, call) {
   c(list(agent = agent), episode_results(history))
 }
 
-# The episodes of an iteration in the loop of all that plays.
+# The episodes of an iteration, in the same loop as rollouts.
 play_iteration <- function(state, vector_env, settings, policy = NULL, ...) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
@@ -205,7 +207,7 @@ play_iteration <- function(state, vector_env, settings, policy = NULL, ...) {
   history
 }
 
-# A value that has become infinite stays so.
+# An infinite value would stay infinite.
 check_rewards <- function(reward, call) {
   if (!all(is.finite(reward))) {
     gym_abort(
@@ -218,9 +220,9 @@ check_rewards <- function(reward, call) {
 
 # Judging by a model ------------------------------------------------------------------
 
-#' The model by which a learner's policy is judged, `NULL` where there is none
+#' Get the model by which a learner's policy is evaluated, or `NULL`
 #'
-#' Whether an environment that is named by its id has one is asked where it is one of those that do.
+#' The server is asked only about environments given by their id that may have a model.
 #' @noRd
 judging_model <- function(settings, client) {
   model <- known_model(settings, client)
@@ -240,7 +242,7 @@ known_model <- function(settings, client) {
   if (is_registered(env)) {
     model_or_null(rlang::exec("env_model", env, !!!settings$kwargs))
   } else if (grepl(modelled_ids, env)) {
-    # A server's environment is asked once.
+    # The server is asked once per environment.
     known <- known_of_env(client, env, settings$kwargs)
     known$model <- known$model %||% list(model_or_null(
       rlang::exec("env_model", env, !!!settings$kwargs, client = client)
@@ -257,7 +259,7 @@ model_or_null <- function(code) {
   tryCatch(
     code, gym_error_no_model = function(cnd) NULL,
     gym_error_http_400 = function(cnd) {
-      # Taxi with a fickle passenger, for one, has no table that holds.
+      # Taxi with a fickle passenger, for example, has no valid table.
       if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
     }
   )
@@ -296,7 +298,7 @@ model_to_sample <- function(settings, call) {
 }
 
 #' Evaluate a policy by a model, exactly
-#' @return As [evaluate_episodes()], for no episodes; `NULL` for a policy that draws its actions.
+#' @return As [evaluate_episodes()] for no episodes; `NULL` for a policy that draws its actions.
 #' @noRd
 evaluate_exactly <- function(model, policy, max_steps) {
   limit <- min(max_steps %||% Inf, model$spec$max_episode_steps %||% Inf)

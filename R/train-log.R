@@ -8,15 +8,15 @@ log_columns <- c(
   "rollout/ep_len_mean", "eval/mean_reward", "eval/mean_ep_length"
 )
 
-# The lines of the table for these iterations, the first of which has the names of the columns.
+# The table's lines for these iterations; the first line has the column names.
 log_lines <- function(state, iterations) {
   rows <- rows_table(state$history[iterations], no_iterations)
   evaluations <- rows_table(state$evaluations, no_evaluations)
-  # Of several evaluations of an iteration the last, which had the most episodes.
+  # Of several evaluations in an iteration, the last counts, which had the most episodes.
   evaluations <- evaluations[!duplicated(evaluations$iteration, fromLast = TRUE), ]
   evaluated <- evaluations[match(rows$iteration, evaluations$iteration), ]
   length <- evaluated$steps / evaluated$episodes
-  # One that was calculated by a model has no episodes.
+  # An evaluation by a model has no episodes.
   length[!is.finite(length)] <- NA
   table <- data.frame(
     rows$iteration, rows$steps, round(rows$elapsed, 3),
@@ -24,7 +24,7 @@ log_lines <- function(state, iterations) {
     rows$median_return, rows$max_return, rows$mean_length, evaluated$mean_return, length
   )
   of_agent <- names(agent_log(state$agent))
-  # Before the first iteration there are only names.
+  # Before the first iteration there are only column names.
   if (!nrow(rows)) rows[of_agent] <- rep(list(numeric()), length(of_agent))
   csv_lines(rlang::set_names(
     cbind(table, rows[of_agent]), c(log_columns, paste0("train/", of_agent, recycle0 = TRUE))
@@ -51,9 +51,9 @@ csv_lines <- function(table) {
 
 #' Prepare to log a training
 #'
-#' The table is written anew when the training begins or goes on, so that it has what the history
-#' has, and after a line could not be written. Otherwise lines are appended.
-#' @param state The training as it begins or goes on.
+#' The table is written completely when training begins or resumes, so that it agrees with the
+#' history, and after a line could not be written. Otherwise lines are appended.
+#' @param state The training as it begins or resumes.
 #' @return A function that is called after each iteration.
 #' @noRd
 training_log <- function(folder, settings, state, call) {

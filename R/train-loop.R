@@ -1,10 +1,10 @@
-# The one loop that trains agents: ask the agent, play its candidates, tell it what came of it. A
-# learner plays by itself (train-learner.R). When training ends stands in train-evaluation.R.
+# The loop that trains agents: ask the agent, play its candidates, tell it the results. A learner
+# plays by itself (train-learner.R). train-evaluation.R decides when training ends.
 
-#' Make what changes while an agent is trained
+#' Make the state of a training, which changes during training
 #'
-#' @return An environment. Between iterations what `kept_of_training` names, with the streams, is
-#'   all that is needed to go on.
+#' @return An environment. Between iterations, the elements in `kept_of_training` and the streams
+#'   are all that is needed to resume.
 #' @noRd
 new_state <- function(settings) {
   generator <- new_generator(settings$seed)
@@ -12,15 +12,15 @@ new_state <- function(settings) {
     agent = settings$agent, iteration = 0L, steps = 0, history = list(), evaluations = list(),
     episodes = list(), final = NULL, solved = FALSE, ended = FALSE,
     streams = new_streams(settings$seed),
-    # Evaluations draw from streams of their own, so that training does not depend on them.
+    # Evaluations have their own streams, so that training does not depend on them.
     evaluation_streams = new_streams(with_generator(generator, draw_seed())),
     started = proc.time()[["elapsed"]], report = function(ended) NULL, log = function() NULL,
     checkpoint = function(last = FALSE) NULL
   )
 }
 
-#' Train until the end, an interrupt or an error, which carries what was played
-#' @param state As [new_state()] makes it, with an agent that has begun.
+#' Train until the end, an interrupt or an error; an error carries the finished part
+#' @param state As made by [new_state()], with an agent that has started.
 #' @param call The user's call.
 #' @return As [training_result()].
 #' @noRd
@@ -93,7 +93,7 @@ train_iteration <- function(state, vector_env, settings, call) {
     vector_env, history, function(which) policy_subset(candidates, which),
     report = function(ended) state$report(history$played_episodes + ended),
     max_steps = settings$max_steps %||% Inf,
-    # Candidates after one that has reached the target need not be played.
+    # After a candidate has reached the target, the later ones need not be played.
     target = if (settings$search) settings$target,
     keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
     keep_next = "trajectories" %in% needs
@@ -106,13 +106,13 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
   episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
-  # An agent that learns from steps is told by its episodes, not by the means of candidates.
+  # An agent that learns from steps gets the results of its episodes, not the means of candidates.
   if ("trajectories" %in% needs) results[c("returns", "lengths")] <- episode_results(history)
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 
 # What plays an iteration: candidates, networks with the weights that the agent asks for; or the
-# behavior policy itself where it has no weights.
+# behavior policy itself if it has no weights.
 asked_candidates <- function(state, agent, call) {
   policy <- agent_behavior(agent)
   if (!inherits(policy, "gym_policy_network")) {
@@ -124,14 +124,14 @@ asked_candidates <- function(state, agent, call) {
   list(candidates = policy_candidates(policy, asked), weights = asked)
 }
 
-# The returns and lengths of all episodes that were played.
+# The returns and lengths of all episodes.
 episode_results <- function(history) {
   lapply(c(returns = "return", lengths = "length"), function(name) {
     unlist(lapply(history$batches, `[[`, name))
   })
 }
 
-# As many rounds of a search are played side by side as a batch of episodes has room for.
+# A search plays as many rounds in parallel as a batch of episodes has room for.
 rounds_together <- function(state, vector_env, settings) {
   left <- (settings$iterations %||% Inf) - state$iteration
   room <- if (length(vector_env$remembers)) Inf else vector_env$batch_size %/% settings$episodes
@@ -139,15 +139,15 @@ rounds_together <- function(state, vector_env, settings) {
   if (is.finite(together)) as.integer(together) else 1L
 }
 
-#' Enter what was played into the history
+#' Add the played iteration to the history
 #'
-#' An interrupt finds it entered completely, or not at all.
-#' @param steps How many steps each candidate, or each episode of a learner, has taken.
+#' After an interrupt it is added completely or not at all.
+#' @param steps The number of steps of each candidate, or of each episode of a learner.
 #' @param episodes The table of a search's episodes.
 #' @noRd
 enter_iteration <- function(state, settings, agent, results, steps, episodes = NULL) {
   if (settings$search) {
-    # Each candidate is an iteration; how long it took is not known of one among others.
+    # Each candidate is an iteration; its own time is not known if several are played in parallel.
     history <- Map(
       history_row, state$iteration + seq_along(steps), state$steps + cumsum(steps),
       results$returns, steps / settings$episodes, NA_real_
@@ -211,12 +211,12 @@ abort_agent <- function(value, method, must, call) {
   )
 }
 
-# The steps of all candidates as rows, episode after episode.
+# The steps of all candidates as rows, episode by episode.
 played_trajectories <- function(history, vector_env) {
   batches <- history$batches
   steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
   row <- step_rows(batches)
-  # Step by step the episodes were played side by side.
+  # In step-by-step play the episodes were played in parallel.
   mixed <- is.unsorted(row)
   order <- if (mixed) order(row, method = "radix") else seq_along(row)
   row <- row[order]
@@ -227,7 +227,7 @@ played_trajectories <- function(history, vector_env) {
   }
   episodes <- episodes_table(batches, several = TRUE)
   truncated <- unlist(each("truncated"))[order]
-  # An episode that `max_steps` cut short is truncated in its last step.
+  # An episode that `max_steps` cuts off is truncated in its last step.
   truncated[!duplicated(row, fromLast = TRUE)] <- episodes$truncated
   list(
     candidate = episodes$candidate[row], episode = episodes$episode[row],
@@ -239,8 +239,7 @@ played_trajectories <- function(history, vector_env) {
   )
 }
 
-# What an agent is told of its candidates. Those after one that has ended the search were not
-# played.
+# The results of an agent's candidates. Those after the one that ended the search were not played.
 candidate_results <- function(history, asked, call) {
   each <- function(name) {
     values <- unlist(lapply(history$batches, function(batch) batch[[name]]))
@@ -270,8 +269,8 @@ candidate_results <- function(history, asked, call) {
 
 reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
 
-# A progress bar: a function that is called after each iteration. While rounds of a search are
-# played side by side, it is told as well how many of their episodes have ended.
+# A progress bar: a function that is called after each iteration. During a batch of rounds of a
+# search, it also gets the number of finished episodes.
 training_progress <- function(settings, state, progress, frame = parent.frame()) {
   by_steps <- is.null(settings$iterations)
   unit <- if (by_steps) "Step" else if (settings$search) "Round" else "Iteration"
