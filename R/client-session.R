@@ -8,7 +8,7 @@
 #' session. This server accepts calls from this session only, by a secret token (see
 #' [gym_server_start()]).
 #'
-#' @inheritSection gym_server_start Where there is no Python
+#' @inheritSection gym_server_start If there is no Python
 #' @return A client, as returned by [create_GymClient()].
 #' @section Errors: `gym_error_server_start` if no server could be started. `gym_error_install` if
 #'   its Python environment could not be installed.

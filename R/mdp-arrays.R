@@ -1,19 +1,19 @@
-#' Give a model as arrays
+#' Convert a model to arrays
 #'
-#' Turns a model into the arrays that other packages take: `P` and `R` are those of MDPtoolbox
+#' Convert a model to the arrays that other packages use: `P` and `R` are those of MDPtoolbox
 #' (`MDPtoolbox::mdp_value_iteration(P, R, discount)`), and with `start` and their dimnames those of
 #' markovDP.
 #'
-#' These packages know no episodes. So one more state, the last, is where episodes go when they end,
-#' and which is never left.
+#' These packages do not have episodes. The arrays therefore have one more state, the last. Episodes
+#' go there when they end, and nothing leaves it.
 #'
 #' @param model A model, see [gym_model()].
 #' @return A list: `P`, an array of (S + 1) x (S + 1) x A for S states and A actions, whose element
-#'   `[i, j, a]` is how likely action a leads from state i to state j; `R`, a matrix of (S + 1) x A
-#'   with the expected rewards; `start`, how likely each state is the first one. The dimnames are
-#'   the numbers of the states and actions, and `"end"`. An action that cannot be taken in a state
-#'   leads to the end for a reward of `-Inf`.
-#' @section Errors: `gym_error_argument` when `model` is no model, or too large for an array.
+#'   `[i, j, a]` is the probability that action a leads from state i to state j; `R`, a matrix of
+#'   (S + 1) x A with the expected rewards; `start`, the probability that each state is the first
+#'   one. The dimnames are the numbers of the states and actions, and `"end"`. An invalid action in
+#'   a state leads to the end with a reward of `-Inf`.
+#' @section Errors: `gym_error_argument` if `model` is not a model, or too large for an array.
 #' @export
 #' @examples
 #' walk <- gym_model(data.frame(
@@ -43,7 +43,7 @@ model_arrays <- function(model) {
   r <- array(0, c(states + 1L, actions), name)
   expected <- rowsum(table$probability * table$reward, from + (states + 1) * (action - 1))
   r[as.double(rownames(expected))] <- expected
-  # To the end, and there for ever.
+  # To the end, and there forever.
   barred <- rbind(!possible_actions(model), TRUE)
   at <- which(barred, arr.ind = TRUE)
   p[cbind(at[, 1L], states + 1L, at[, 2L])] <- 1

@@ -1,15 +1,14 @@
-# A model as matrices with a row for each pair of a state and an action, by which all states are
-# looked at in one vectorised step.
+# A model as matrices with a row for each pair of a state and an action, so that one vectorised step
+# processes all states.
 
 #' Prepare a model for sweeps over all its states
 #'
-#' Row s + S * (a - 1) is that of state s and action a, both counted from 1, of S states; the
-#' columns are the transitions from there, of which the last may be empty.
+#' Row s + S * (a - 1) belongs to state s and action a, both counted from 1, of S states. The
+#' columns are the transitions from there; the last ones may be empty.
 #' @param call The user's call.
-#' @return A list: `states` and `actions`, how many there are; `next_state` (from 1), `probability`,
-#'   `terminated` and `weight`, matrices, the weight being the probability that the episode goes on
-#'   there; `expected`, the expected reward of each row; `possible`, whether the action can be
-#'   taken.
+#' @return A list: `states` and `actions`, their numbers; `next_state` (from 1), `probability`,
+#'   `terminated` and `weight`, matrices, where the weight is the probability that the episode goes
+#'   on there; `expected`, the expected reward of each row; `possible`, whether the action is valid.
 #' @noRd
 backup_of <- function(model, call) {
   table <- model$transitions
@@ -34,7 +33,7 @@ backup_of <- function(model, call) {
   probability <- filled(table$probability)
   rewards <- probability * filled(table$reward)
   expected <- rowSums(rewards)
-  # Rewards that cancel out leave nothing but rounding.
+  # Rewards that cancel out leave only rounding errors.
   expected[abs(expected) <= 4 * .Machine$double.eps * rowSums(abs(rewards))] <- 0
   with_flow(list(
     states = states, actions = actions,
@@ -45,11 +44,11 @@ backup_of <- function(model, call) {
   ))
 }
 
-# Up to so many states moves are kept in a full matrix: loading the package Matrix takes longer
-# than computing with such a matrix.
+# Up to this number of states, moves are kept in a full matrix: loading the package Matrix takes
+# longer than computing with such a matrix.
 full_states <- 500L
 
-# Where there are many states, sweeps are quicker with the weights in one sparse matrix.
+# With many states, sweeps are faster with the weights in one sparse matrix.
 with_flow <- function(backup) {
   if (backup$states > full_states) {
     used <- which(backup$weight > 0)
@@ -76,21 +75,21 @@ check_fits_memory <- function(cells, what, call, arg = "model", hint = NULL) {
   }
 }
 
-# Numbers of states and actions, counted from 1.
+# Numbers of states, counted from 1.
 state_rows <- function(model, state) as.integer(state - model$observation_space$start + 1L)
 action_columns <- function(model, action) as.integer(action - model$action_space$start + 1L)
 
-# The number of the pair of a state, given by its row, and an action.
+# The number of the pair of a state (given by its row) and an action.
 pair_rows <- function(model, row, action) {
   row + length(model$start) * (action_columns(model, action) - 1L)
 }
 
-# The value of each action in each state, a matrix, given the value of each state: Bellman's
-# equation. Actions that cannot be taken have -Inf.
+# The value of each action in each state, a matrix, given the value of each state (Bellman's
+# equation). Invalid actions have -Inf.
 action_values <- function(backup, values, discount) {
   if (is.null(backup$flow)) {
     ahead <- values[backup$next_state]
-    # Where nothing leads an infinite value counts nothing.
+    # An infinite value that nothing leads to must not count.
     if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
     ahead <- .rowSums(backup$weight * ahead, nrow(backup$weight), ncol(backup$weight))
   } else {
@@ -102,26 +101,26 @@ action_values <- function(backup, values, discount) {
   q
 }
 
-# The value of each state by the best action; of a state that no action leaves 0.
+# The value of each state by the best action; 0 for a state without actions.
 best_values <- function(q) {
   best <- row_max(q)
   best[best == -Inf] <- 0
   best
 }
 
-# The value of each state when actions are taken with these probabilities, a matrix like `q`.
+# The value of each state under these action probabilities, a matrix like `q`.
 mean_values <- function(q, probabilities) {
   q[probabilities == 0] <- 0
   .rowSums(q * probabilities, nrow(q), ncol(q))
 }
 
-#' How a policy moves from state to state
+#' Describe how a policy moves from state to state
 #'
 #' @param probabilities A matrix with a row for each state and a column for each action.
-#' @return A list: `weight`, a matrix of how likely state j follows on state i, the rest of a row
-#'   being the end of the episode, which is sparse where there are many states; `from` and `to`, the
-#'   states of each of its moves; `reward`, the expected reward in each state; `ends`, the states in
-#'   which the episode may end.
+#' @return A list: `weight`, a matrix of the probability that state j follows state i, sparse if
+#'   there are many states; the rest of a row is the end of the episode; `from` and `to`, the states
+#'   of each move; `reward`, the expected reward in each state; `ends`, the states in which the
+#'   episode may end.
 #' @noRd
 chain_of <- function(backup, probabilities) {
   states <- backup$states
@@ -150,11 +149,11 @@ flow_matrix <- function(from, to, weight, states) {
 # A matrix, full or sparse, times a vector.
 times <- function(matrix, vector) as.vector(matrix %*% as.double(vector))
 
-#' The states from which some are reached
+#' Find the states from which some states are reached
 #'
 #' @param leads A function of a logical vector of states that returns those from which one of them
 #'   is reached in one step.
-#' @param reached The states to begin with, a logical vector.
+#' @param reached The states to start with, a logical vector.
 #' @noRd
 closure <- function(leads, reached) {
   repeat {

@@ -1,10 +1,10 @@
-# What check_env() finds where an environment in R has a model: whether it plays as the model says.
+# check_env() compares an environment in R with its model, if it has one.
 
-# So many steps are taken, and no more in an episode than this.
+# The largest number of steps in total and in an episode.
 most_compared <- 1000L
 most_compared_in_episode <- 100L
 
-# What the model says and play never shows is a mistake where chance would make it as rare as this.
+# A transition of the model that play never shows is a mistake if this is less likely by chance.
 too_rare <- 1e-9
 
 #' @exportS3Method
@@ -29,8 +29,8 @@ is_wrong <- function(check) {
   any(vapply(check$found, function(finding) finding$severity == "wrong", NA))
 }
 
-# Plays with random actions of those that the model has; all sub-environments together, until the
-# first of them ends. Returns what all of them came to, one after the other.
+# Plays random valid actions in all sub-environments together, until the first of them ends. Returns
+# their steps, one sub-environment after the other.
 play_by_model <- function(check, model, seed) {
   possible <- possible_actions(model)
   starts <- steps <- list()
@@ -51,13 +51,13 @@ play_by_model <- function(check, model, seed) {
   )
 }
 
-# The steps of one episode, which has begun in `state`.
+# The steps of one episode, which starts in `state`.
 steps_by_model <- function(check, model, possible, state, seed) {
   steps <- list()
   ended <- FALSE
   while (!ended && length(steps) < most_compared_in_episode && !is_wrong(check)) {
     choices <- possible[state_rows(model, state), , drop = FALSE]
-    # Where nothing can be done, by the model, the episode should have ended.
+    # In a state without actions, by the model, the episode should have ended.
     if (!all(rowSums(choices) > 0)) break
     action <- state_numbers(model$action_space)[draw_by_row(choices / rowSums(choices))]
     place <- paste0("step ", length(steps) + 1L, " of the episode with seed ", seed)
@@ -121,7 +121,7 @@ compare_steps <- function(check, model, steps) {
   ))
 }
 
-# The first step that the table does not have, and in which column, or `NULL`.
+# The first step that the table does not have, and the column that differs, or `NULL`.
 first_unlike <- function(steps, table) {
   played <- step_keys(steps)
   known <- step_keys(table)
@@ -133,8 +133,8 @@ first_unlike <- function(steps, table) {
   }
 }
 
-# Texts that are the same for the same steps: up to where they lead, the end and the reward, which
-# may have been rounded.
+# Texts that are equal for equal steps: the next state, the end and the reward, which may have been
+# rounded.
 step_keys <- function(steps) {
   next_state <- paste(steps$state, steps$action, steps$next_state)
   terminated <- paste(next_state, steps$terminated)

@@ -1,19 +1,19 @@
 #' Get the model of an environment
 #'
-#' Asks an environment for the table by which it moves. Gymnasium's FrozenLake, CliffWalking and
-#' Taxi have one, with the arguments that they were made with, and so has an environment of your own
-#' that was made with `gym_env(model = )`.
+#' Return the table of transitions of an environment. Gymnasium's FrozenLake, CliffWalking and Taxi
+#' have one, for the arguments they were made with, and so has your own environment made with
+#' `gym_env(model = )`.
 #'
 #' @param env The environment: an id, such as `"FrozenLake-v1"`, or one made by [gym_make()] or
-#'   [gym_env()], which is not moved.
-#' @param ... The environment's own arguments, by name, where it is named by its id, such as
+#'   [gym_env()], which is not changed.
+#' @param ... Arguments of the environment, by name, if it is given by its id, such as
 #'   `is_slippery = FALSE`.
-#' @param client The client of the server where an environment named by its id is made; the default
-#'   is the session's own, [gym_client()].
+#' @param client The client of the server that makes an environment given by its id. The default is
+#'   the session's client, [gym_client()].
 #' @return An object of class [gym_model].
 #' @section Errors: `gym_error_no_model`, a kind of `gym_error_argument`, for an environment in R
-#'   without a model; `gym_error_http_400` for one of Gymnasium's that has none, that is a vector
-#'   environment, or that has wrappers, which may change what the model says.
+#'   without a model. `gym_error_http_400` for one of Gymnasium's without a model, for a vector
+#'   environment, or for one with wrappers, which may change the transitions.
 #' @seealso [solve_mdp()], [gym_model()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -39,7 +39,7 @@ env_model <- function(env, ..., client = gym_client()) {
   model_of_env(env, rlang::current_env())
 }
 
-# What a function takes as a model.
+# Converts an argument to a model.
 as_model <- function(x, call = rlang::caller_env()) {
   if (inherits(x, "gym_model")) {
     return(x)
@@ -72,7 +72,7 @@ model_of_env.gym_server_env <- function(env, call) {
   )
 }
 
-# What a wrapper in R does the server's table does not know.
+# The server's table does not contain what a wrapper in R does.
 #' @exportS3Method
 model_of_env.gym_wrapped_server_env <- function(env, call) abort_without_model(env, call)
 
@@ -97,11 +97,11 @@ model_of_env.gym_r_env <- function(env, call) {
   model
 }
 
-# How many resets show where episodes start that `reset()` draws.
+# The number of resets that estimate the starting states drawn by `reset()`.
 most_resets <- 1000L
 
-# How likely each state of a model is the first one, as `reset()` of its environment has it. What is
-# reset is another sub-environment.
+# The probability that each state of a model is the first one, by `reset()` of its environment. A
+# copy of the sub-environment is reset.
 starts_of <- function(env, model, call) {
   definition <- definition_of(env)
   sub_env <- definition_sub_env(definition, if (definition$vectorized) most_resets)
@@ -144,7 +144,7 @@ check_fits_env <- function(model, env, call) {
     abort_argument(model, "a model or its table of transitions", "gym_env(model = )", call)
   }
   for (name in c("observation_space", "action_space")) {
-    # One of several sub-environments counts.
+    # Of several sub-environments, one is enough.
     space <- env[[paste0("single_", name)]] %||% env[[name]]
     if (!identical(format(model[[name]]), format(space))) {
       gym_abort(

@@ -1,13 +1,13 @@
-# The linear equations of a policy's values, by sweeps where few are enough, else solved.
+# The linear equations of a policy's values, by sweeps if few are enough, otherwise solved directly.
 
-# Up to so many states equations are solved at once; sweeps would take longer.
+# Up to this number of states equations are solved at once; sweeps would take longer.
 unswept_states <- 100L
 
 #' Prepare to solve `values = rewards + weight %*% values`
 #'
 #' @param weight A square matrix, full or sparse, without negative numbers.
-#' @return A function of rewards, none of which may be negative: so each value is accurate relative
-#'   to its own size, also one that is tiny beside the others.
+#' @return A function of rewards, none of which may be negative. Each value is then accurate
+#'   relative to its own size, even if it is tiny compared with the others.
 #' @noRd
 chain_solver <- function(weight, call) {
   solver <- NULL
@@ -26,12 +26,12 @@ chain_solver <- function(weight, call) {
   }
 }
 
-#' Apply a policy's equations until the values stay
+#' Apply a policy's equations until the values do not change any more
 #'
-#' Where after k sweeps from 0 no value grows by more than a share e of itself, none grows by more
-#' than a share of about 2 k e in the k sweeps that follow, and so on: this is how far off they are
-#' at most. Or the bounds of what is still to come are close to each other, which is often sooner.
-#' @return The values, or `NULL` where so many sweeps would be needed that solving is quicker.
+#' If after k sweeps from 0 no value grows by more than a share e of itself, none grows by more than
+#' a share of about 2 k e in the next k sweeps, and so on. This bounds the error. Alternatively, the
+#' bounds of the remaining growth are close to each other, which is often the case sooner.
+#' @return The values, or `NULL` if so many sweeps would be needed that solving is faster.
 #' @noRd
 swept_values <- function(weight, rewards, enough = 1e-15) {
   most <- 500L
@@ -50,7 +50,7 @@ swept_values <- function(weight, rewards, enough = 1e-15) {
       return(final)
     }
     if (sweep %% every == 0L) {
-      # How many more sweeps it takes when growth goes down as it did.
+      # The number of further sweeps if growth continues to decrease at this rate.
       if (share >= before || every * log(enough / share) / log(share / before) > most - sweep) {
         return(NULL)
       }
@@ -59,8 +59,8 @@ swept_values <- function(weight, rewards, enough = 1e-15) {
   }
 }
 
-# A function that multiplies a full matrix by a vector, of which it looks only at the numbers that
-# are not 0, put to the left.
+# A function that multiplies a full matrix by a vector. It uses only the non-zero numbers, which are
+# moved to the left.
 padded_product <- function(weight) {
   at <- which(t(weight) > 0, arr.ind = TRUE)
   from <- at[, 2L]
@@ -73,13 +73,12 @@ padded_product <- function(weight) {
   function(x) .rowSums(left * x[column], shape[[1L]], shape[[2L]])
 }
 
-#' Prepare to judge values by how they grew in a sweep
+#' Prepare to estimate values from their growth in a sweep
 #'
-#' What is still to come lies between the least and the greatest growth times the steps that are
-#' still to go (MacQueen 1966, A modified dynamic programming method for Markovian decision
-#' problems).
-#' @return A function of values and their growth that returns the values with the middle of these
-#'   bounds added, or `NULL` where they are too far from each other.
+#' The remaining growth lies between the least and the greatest growth times the remaining steps
+#' (MacQueen 1966, A modified dynamic programming method for Markovian decision problems).
+#' @return A function of values and their growth that returns the values plus the middle of these
+#'   bounds, or `NULL` if the bounds are too far apart.
 #' @noRd
 growth_bounds <- function(weight) {
   goes_on <- range(times(weight, rep(1, nrow(weight))))
@@ -96,7 +95,7 @@ growth_bounds <- function(weight) {
 
 solved_values <- function(weight, rewards, solver) {
   values <- solver(rewards)
-  # What solving left over is solved again, until it is only rounding in every single state.
+  # The residual of the solution is solved again, until only rounding is left in every state.
   for (round in 1:3) {
     left <- rewards + times(weight, values) - values
     if (all(abs(left) <= 8 * .Machine$double.eps * values)) break
@@ -116,8 +115,8 @@ sparse_solver <- function(weight) {
     i = c(all, weight@i + 1L), j = c(all, rep(all, diff(weight@p))),
     x = c(rep(1, length(all)), -weight@x), dims = dim(weight)
   )
-  # With such a tolerance the pivots are those of the diagonal, which are the accurate ones where
-  # all other numbers are negative, and which leave more zeros.
+  # With this tolerance the pivots are on the diagonal. They are accurate if all other numbers are
+  # negative, and leave more zeros.
   factors <- Matrix::lu(equations, tol = 1e-300)
   function(rewards) {
     values <- numeric(length(rewards))

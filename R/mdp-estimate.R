@@ -1,19 +1,19 @@
 #' Estimate a model from steps
 #'
-#' Counts in steps that were played how often each action led where, and for which reward, and takes
-#' the shares for probabilities (maximum likelihood). What was never tried is not in the model.
+#' Count in played steps how often each action led where and with which reward, and use the shares
+#' as probabilities (maximum likelihood). Actions that were never tried are not in the model.
 #'
-#' @param x What [rollout()] returned with `steps = TRUE, next_observation = TRUE`, or a data frame
-#'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`, and perhaps
-#'   `episode`, by whose first rows it is known where episodes start.
+#' @param x The result of [rollout()] with `steps = TRUE, next_observation = TRUE`, or a data frame
+#'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`, and optionally
+#'   `episode`, whose first rows show where episodes start.
 #' @param ... For methods.
-#' @return A model, see [gym_model()], whose states and actions are all of the environment's, where
-#'   the rollout's policy knows them, and otherwise those from the lowest to the highest number that
-#'   was seen. A state that was reached but never left, because episodes
-#'   were cut off there, counts as an end; a message says so.
-#' @section Errors: `gym_error_argument` for steps that were not kept, or whose observations are not
+#' @return A model, see [gym_model()]. Its states and actions are all of the environment's, if the
+#'   rollout's policy knows them, and otherwise those from the lowest to the highest number in the
+#'   steps. A state that was reached but never left, because episodes were cut off there, counts as
+#'   terminal; a message says so.
+#' @section Errors: `gym_error_argument` for a rollout without steps, or observations that are not
 #'   Discrete.
-#' @seealso [env_model()], which asks the environment
+#' @seealso [env_model()], which gets the model from the environment
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' played <- rollout("FrozenLake-v1", policy_random(), episodes = 1000, seed = 1, steps = TRUE,
@@ -53,7 +53,7 @@ estimate_model.gym_rollout <- function(x, ...) {
     next_state = steps[[after]], reward = steps$reward,
     terminated = steps$terminated
   )
-  # What the policy knows of the environment; a function knows nothing.
+  # The spaces of the environment, if the policy has them; a function does not.
   spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
   attr(table, "spaces") <- spaces
   model <- estimate_model(table)
@@ -85,7 +85,7 @@ estimate_model.data.frame <- function(x, ...) {
   )
 }
 
-# Arriving at a state that was never left ends the episode, as far as is known.
+# As far as is known, arriving at a state that was never left ends the episode.
 end_at_unknown <- function(steps) {
   stuck <- !steps$terminated & !steps$next_state %in% steps$state
   count <- length(unique(steps$next_state[stuck]))

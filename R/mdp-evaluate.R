@@ -1,18 +1,19 @@
 #' Evaluate policies exactly
 #'
-#' Where the model of an environment is known, what a policy comes to is calculated instead of
-#' played: nothing is drawn, and there is no interval.
+#' Compute the expected return of a policy from the model of the environment, instead of playing.
+#' Nothing is random, and there is no interval.
 #'
 #' @inheritParams solve_mdp
 #' @param env A model, see [gym_model()] and [env_model()].
 #' @param policy The policy, as for [solve_mdp()], or a list of several.
-#' @param max_steps After how many steps episodes are cut off, a whole number. `NULL`, the default,
-#'   takes the model's own limit, and without one they go on to their end; `Inf` does so, too.
+#' @param max_steps The number of steps after which episodes are cut off, a whole number. `NULL`,
+#'   the default, uses the model's own limit. Without a limit, or with `Inf`, episodes go on to
+#'   their end.
 #' @param ... Must be empty.
 #' @return A data frame with a row for each policy and the columns `candidate` (its number, an
 #'   integer), `mean_return` and `mean_length` (doubles: the expected return, and the expected
-#'   number of steps) and `max_steps` (double, `Inf` for no limit). Names of policies in a list are
-#'   the names of rows.
+#'   number of steps) and `max_steps` (double, `Inf` for no limit). Names of policies in a list
+#'   become row names.
 #' @section Errors: `gym_error_argument` for a policy that does not fit.
 #' @seealso [evaluate_policy()], which plays; [solve_mdp()] for the value of each state
 #' @export
@@ -57,7 +58,7 @@ expected_return <- function(model, backup, probabilities, limit, discount, call)
 }
 
 expected_length <- function(model, backup, probabilities, limit, call) {
-  # What each step counts, in place of the reward.
+  # Each step counts 1 instead of its reward.
   backup$expected <- rep(1, length(backup$expected))
   expected_return(model, backup, probabilities, limit, 1, call)
 }
@@ -70,7 +71,7 @@ limited_values <- function(backup, probabilities, limit, discount, call) {
   if (length(used) > backup$states || !is.null(backup$flow)) {
     return(horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities)))
   }
-  # One action in each state: only its row is looked at.
+  # One action in each state: only its row is used.
   state <- (used - 1L) %% backup$states + 1L
   weight <- discount * backup$weight[used, , drop = FALSE] * probabilities[used]
   next_state <- backup$next_state[used, , drop = FALSE]

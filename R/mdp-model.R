@@ -1,44 +1,43 @@
 #' Write down the model of an environment
 #'
-#' A model is the table by which an environment with finitely many states moves: for each state and
-#' action where it leads, how likely, and for which reward. [env_model()] gives that of an
-#' environment which has one, [estimate_model()] makes one of steps that were played, and this
-#' function takes a table that you have typed.
+#' A model is the table of transitions of an environment with finitely many states. For each state
+#' and action it has the next states, their probabilities and their rewards. This function takes a
+#' table that you write down. [env_model()] returns that of an existing environment, and
+#' [estimate_model()] estimates one from steps.
 #'
-#' A model can be solved by [solve_mdp()] and judges a policy exactly, by
-#' [evaluate_policy()][evaluate_policy.gym_model()]. And it is an environment by itself:
-#' [rollout()], [train_agent()] and everything else that plays takes it where an environment is
-#' wanted, and [model_env()] gives it as an object with `$reset()` and `$step()`.
+#' [solve_mdp()] solves a model, and [evaluate_policy()][evaluate_policy.gym_model()] evaluates a
+#' policy by it exactly. A model is also an environment: [rollout()], [train_agent()] and all other
+#' functions that play accept it. [model_env()] makes it an object with `$reset()` and `$step()`.
 #'
-#' States and actions keep the environment's own numbers, which in Gymnasium begin at 0. The rows
-#' and columns of matrices and vectors count from 1, as always in R: the first row is that of the
-#' lowest number.
+#' States and actions have the environment's own numbers, which start at 0 in Gymnasium. Rows and
+#' columns of matrices and vectors start at 1, as always in R: the first row belongs to the lowest
+#' number.
 #'
 #' @param transitions A data frame with a row for each transition and the columns `state`, `action`
-#'   and `next_state` (whole numbers), `reward` (a number), and perhaps `probability` (1 without it)
-#'   and `terminated` (whether the episode ends there; without it `TRUE` where `next_state` is a
-#'   state that no row leaves). An action that has no row in a state cannot be taken there.
+#'   and `next_state` (whole numbers), `reward` (a number), and optionally `probability` (default 1)
+#'   and `terminated` (whether the episode ends there; by default `TRUE` if no row leaves
+#'   `next_state`). An action without a row in a state is invalid there.
 #' @param start Where episodes start: a state's number, or a numeric vector with a probability for
-#'   each state. `NULL`, the default, is any state that some row leaves, each equally likely.
-#' @param id What it is called in messages and titles, a string.
-#' @param max_episode_steps After how many steps an episode is cut off when it is played, a whole
-#'   number; `NULL`, the default, for never.
-#' @param reward_threshold The mean return from which it counts as solved, a number; `NULL`, the
+#'   each state. `NULL`, the default, draws uniformly from the states that some row leaves.
+#' @param id Its name in messages and titles, a string.
+#' @param max_episode_steps The number of steps after which an episode is cut off in play, a whole
+#'   number. `NULL`, the default, for no limit.
+#' @param reward_threshold The mean return from which it counts as solved, a number. `NULL`, the
 #'   default, for none.
 #' @return An object of class `gym_model`, a list with the elements
 #'   \describe{
 #'     \item{transitions}{A data frame with the columns `state`, `action`, `next_state` (integer),
 #'       `probability`, `reward` (double) and `terminated` (logical), sorted by state and action.
-#'       `as.data.frame()` gives it.}
-#'     \item{start}{How likely each state is the first one, a numeric vector with the states'
-#'       numbers as names.}
+#'       `as.data.frame()` returns it.}
+#'     \item{start}{The probability that each state is the first one, a numeric vector with the
+#'       states' numbers as names.}
 #'     \item{observation_space, action_space}{The states and the actions, Discrete spaces.}
 #'     \item{spec}{A list of `id`, `reward_threshold` and `max_episode_steps`.}
 #'   }
-#'   [model_arrays()] gives it as the arrays of other packages.
-#' @section Errors: `gym_error_argument` for a table that is no model: a column that is missing,
-#'   probabilities that do not add up to 1 (the state and the action are named), a state that no row
-#'   leaves although arriving there does not end the episode.
+#'   [model_arrays()] converts it to the arrays of other packages.
+#' @section Errors: `gym_error_argument` for an invalid table: a missing column, probabilities that
+#'   do not add up to 1 (the message names the state and the action), a state that no row leaves
+#'   although arriving there does not end the episode.
 #' @seealso [env_model()], [estimate_model()], [solve_mdp()]
 #' @export
 #' @examples
@@ -70,7 +69,7 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
   new_model(table, states, spanned_space(table$action, "actions"), start, spec)
 }
 
-# The space of all numbers from the lowest to the highest one.
+# The space of all numbers from the lowest to the highest.
 spanned_space <- function(numbers, what, call = rlang::caller_env()) {
   ends <- range(numbers)
   count <- as.double(ends[[2L]]) - ends[[1L]] + 1
@@ -87,7 +86,7 @@ spanned_space <- function(numbers, what, call = rlang::caller_env()) {
   space_discrete(count, ends[[1L]])
 }
 
-# How likely each state is the first one, where it is always this one.
+# The probability that each state is the first one, if it is always this one.
 start_in <- function(start, table, states, call = rlang::caller_env()) {
   if (!start %in% table$state) {
     abort_argument(start, "the number of a state that some row leaves", "start", call)
@@ -95,10 +94,10 @@ start_in <- function(start, table, states, call = rlang::caller_env()) {
   as.double(state_numbers(states) == start)
 }
 
-#' Make a model of a table
+#' Make a model from a table
 #'
-#' @param start How likely each state is the first one, or `NULL`.
-#' @param table As [check_transitions()] returns it.
+#' @param start The probability that each state is the first one, or `NULL`.
+#' @param table As returned by [check_transitions()].
 #' @param call The user's call.
 #' @noRd
 new_model <- function(table, states, actions, start, spec, call = rlang::caller_env()) {
@@ -142,7 +141,7 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
     check_column(x, name, "whole numbers", are_whole_numbers, arg, call)
   }
   check_column(x, "reward", "finite numbers", are_finite, arg, call)
-  # Not `$`, which takes the beginnings of names, too, and warns of a tibble's.
+  # Not `$`: it also matches the start of a name, and a tibble warns.
   x[["probability"]] <- probability <- x[["probability"]] %||% rep(1, nrow(x))
   check_column(x, "probability", "numbers from 0 to 1", are_probabilities, arg, call)
   x[["terminated"]] <- terminated <- x[["terminated"]] %||% !x$next_state %in% x$state
@@ -180,7 +179,7 @@ are_whole_numbers <- function(x) {
 are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 else FALSE
 are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
 
-# How far the probabilities of a state and an action may be from 1 together: they may have been
+# The largest difference from 1 of the sum of a state's and action's probabilities, which may be
 # rounded. The server has the same rule.
 sum_tolerance <- 1e-6
 

@@ -1,16 +1,14 @@
 #' Play a model
 #'
-#' Makes an environment that moves as a model says, drawn from R's own generator. No server is
-#' needed, and all sub-environments are moved at once, so that [rollout()] plays it quickly. Where
-#' an environment is wanted a model can be given itself; this function is for its `$reset()` and
-#' `$step()`.
+#' Make an environment that follows a model, with random numbers from R's own generator. It needs no
+#' server and moves all sub-environments together, so [rollout()] plays it fast. Functions that need
+#' an environment also accept the model itself; use this function for its `$reset()` and `$step()`.
 #'
 #' @param model A model, see [gym_model()].
-#' @param num_envs How many sub-environments it has, a whole number of at least 1; `NULL`, the
-#'   default, for a single environment.
-#' @return An environment as [gym_env()] makes them. An action that cannot be taken in a state is an
-#'   error there.
-#' @section Errors: `gym_error_argument` when `model` is no model.
+#' @param num_envs The number of sub-environments, a whole number of at least 1. `NULL`, the
+#'   default, makes a single environment.
+#' @return An environment as made by [gym_env()]. An invalid action raises an error.
+#' @section Errors: `gym_error_argument` if `model` is not a model.
 #' @export
 #' @examples
 #' walk <- gym_model(data.frame(
@@ -36,7 +34,7 @@ model_env <- function(model, num_envs = NULL) {
         pair <- pair_rows(model, self$row, action)
         check_possible(moves, model, self$row, action, pair, self$over)
         drawn <- draw_transition(moves, pair)
-        # A sub-environment whose episode has ended is stepped with the others, and stays in place.
+        # A sub-environment whose episode has ended is stepped with the others and stays in place.
         self$row <- ifelse(self$over, self$row, moves$next_row[drawn])
         self$over <- self$over | moves$terminated[drawn]
         list(
@@ -70,7 +68,7 @@ can_end <- function(model) {
   any(moves$terminated & moves$reached[moves$from])
 }
 
-# The first state that an episode may come to and never end from, whatever is done; NULL for none.
+# The first state that an episode may reach and can never end from, or NULL.
 state_without_end <- function(model) {
   moves <- ways_of(model)
   ends <- seq_along(moves$reached) %in% moves$from[moves$terminated]
@@ -82,7 +80,7 @@ state_without_end <- function(model) {
   if (length(trap)) state_numbers(model$observation_space)[[trap[[1L]]]]
 }
 
-# From where to where a model moves, and which states are reached from its start.
+# The moves of a model, and the states that are reached from its start.
 ways_of <- function(model) {
   table <- model$transitions[model$transitions$probability > 0, ]
   from <- state_rows(model, table$state)
@@ -98,9 +96,9 @@ ways_of <- function(model) {
 
 #' Prepare the drawing of a model's transitions
 #'
-#' All probabilities, one transition after the other, make one line on which transition i ends at
-#' `until[i]`. Those of a pair of a state and an action lie beside each other from `from` on, so
-#' that one number that is uniform there finds a transition in a single search.
+#' All probabilities, one transition after the other, form one line on which transition i ends at
+#' `until[i]`. Those of a pair of a state and an action are beside each other, starting at `from`.
+#' One search for a uniform number in that part then finds a transition.
 #' @noRd
 moves_of <- function(model) {
   table <- model$transitions
@@ -129,7 +127,8 @@ draw_start <- function(moves, n) {
 draw_transition <- function(moves, pair) {
   at <- moves$from[pair] + stats::runif(length(pair)) * moves$width[pair]
   drawn <- findInterval(at, moves$until) + 1L
-  # By rounding it may lie beside its own transitions; where an episode has ended anything will do.
+  # By rounding the number may fall beside its own transitions. After the end of an episode any
+  # transition will do.
   drawn <- pmin(pmax(drawn, moves$first[pair]), moves$last[pair])
   drawn[is.na(drawn)] <- 1L
   drawn

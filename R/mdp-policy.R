@@ -1,6 +1,6 @@
-# Policies as a model sees them: how likely each action is in each state.
+# Policies in a model: the probability of each action in each state.
 
-#' The probabilities with which a policy acts
+#' Compute the probabilities with which a policy acts
 #'
 #' @param policy As for [solve_mdp()].
 #' @return A matrix with a row for each state and a column for each action.
@@ -63,20 +63,20 @@ rows_of_actions <- function(actions, model, arg, call) {
   probabilities
 }
 
-# How likely a policy takes each action in each state of a model that it is bound to.
+# The probability of each action in each state of a model that the policy is bound to.
 policy_probabilities <- function(policy, model, call) UseMethod("policy_probabilities")
 
 #' @exportS3Method
 policy_probabilities.default <- function(policy, model, call) {
   states <- state_numbers(model$observation_space)
   possible <- rowSums(possible_actions(model)) > 0
-  # States that no action leaves are never asked about in play.
+  # States without actions are never visited in play.
   asked <- states[possible]
   here <- list(
     observation_space = model$observation_space, action_space = model$action_space,
     spec = model$spec, call = call
   )
-  # Twice, from different streams, to see whether it draws.
+  # Twice, with different streams, to see whether it draws.
   ask <- function(seed) {
     as.vector(with_generator(new_generator(seed), act_batch(policy, asked, length(asked), here)))
   }

@@ -1,78 +1,75 @@
 #' Solve a model
 #'
-#' Calculates how much each state of a model is worth, exactly: by the best policy, which is found
-#' on the way, or by one that is given.
+#' Compute the value of each state of a model exactly: under the best policy, which is found as
+#' well, or under a given one.
 #'
-#' # Whose value it is
+#' # Which value
 #'
-#' Three numbers can be meant by the value of an environment whose episodes are cut off, and the
-#' result prints those that it has, for the start:
+#' The value of an environment with a step limit can mean three things. The result prints those that
+#' it has, for the start:
 #'
-#' - The endless one, as if episodes were never cut off. It is what `solve_mdp(model)` calculates.
-#' - That of the same policy when episodes are cut off after the model's `max_episode_steps`: what
-#'   playing it comes to.
-#' - That of the best policy that also counts the steps, and acts otherwise when few are left. It
-#'   is what `solve_mdp(model, horizon = )` calculates, and no policy comes to more.
+#' - The value without the limit, as if episodes were never cut off. `solve_mdp(model)` computes it.
+#' - The value of the same policy with the model's limit, `max_episode_steps`: the expected return
+#'   in play.
+#' - The value of the best policy that also counts the steps and acts differently near the limit.
+#'   `solve_mdp(model, horizon = )` computes it, and no policy achieves more.
 #'
-#' Gymnasium does not count steps in the observation, so what an agent learns looks only at the
-#' state. The best policy of this kind lies between the second and the third; no method here finds
-#' it for certain.
+#' Gymnasium's observations do not include the number of steps, so a learned policy depends only on
+#' the state. The value of the best such policy is between the second and the third; no method here
+#' is certain to find it.
 #'
 #' # Methods
 #'
-#' Value iteration applies Bellman's equation to all states at once until the values no longer
-#' change, or 20,000 times; then policy iteration goes on from the policy that it found, and mostly
-#' confirms it. Policy iteration calculates the values of a policy, improves it, and so on; the
-#' values of a policy are found by sweeps where few are enough, and otherwise by solving its linear
-#' equations, which are sparse from 500 states on. Without a discount a state that can
-#' stay for ever where no reward comes is worth at least 0, and one from which no policy comes to an
-#' end for sure is worth `-Inf`.
+#' Value iteration applies Bellman's equation to all states together until the values do not change
+#' any more, or 20,000 times. Policy iteration then continues from the resulting policy, and mostly
+#' confirms it. Policy iteration computes the values of a policy, improves it, and so on. It finds
+#' the values by sweeps if few are enough, and otherwise by solving the policy's linear equations,
+#' which are sparse from 500 states on. Without a discount, a state that can stay forever without a
+#' reward has a value of at least 0, and a state from which no policy is sure to end has `-Inf`.
 #'
-#' Differences count whatever the size of the rewards: actions are worth the same where their values
-#' differ by less than 1e-12 of their own size, which is that of the rewards that they add up. Where
-#' several actions are worth the same, which is common with a discount of 1, some may lead in
-#' circles for ever; those are taken that end episodes in the fewest steps.
+#' Two actions are equal if their values differ by less than 1e-12 of their size, which is that of
+#' the rewards in their sums. If several actions are equal, which is common with a discount of 1,
+#' some of them may lead in circles forever. The policy takes those that end episodes in the fewest
+#' steps.
 #'
 #' @param model A model, see [gym_model()], or an environment that has one, as for [env_model()].
-#' @param policy The policy to value: a [policy_table()], [policy_random()], or another policy that
-#'   draws nothing, a vector with the number of an action for each state, or a matrix of
-#'   probabilities with a row for each state and a column for each action. `NULL`, the default, for
-#'   the best one.
-#' @param discount The discount, by which a reward counts less with each step that it is away, a
-#'   number above 0 and at most 1, the default.
-#' @param horizon After how many steps everything ends, a whole number; `NULL`, the default, for
-#'   never.
-#' @param method `"value_iteration"`, the default, or `"policy_iteration"`; with a policy or a
-#'   horizon it makes no difference.
+#' @param policy The policy to evaluate: a [policy_table()], [policy_random()], or another policy
+#'   without random numbers, a vector with the number of an action for each state, or a matrix of
+#'   probabilities with a row for each state and a column for each action. `NULL`, the default,
+#'   finds the best policy.
+#' @param discount The factor by which a reward counts less with each step, a number above 0 and at
+#'   most 1, the default.
+#' @param horizon The number of steps after which everything ends, a whole number. `NULL`, the
+#'   default, for no end.
+#' @param method `"value_iteration"`, the default, or `"policy_iteration"`. Ignored with a policy or
+#'   a horizon.
 #' @param trace Keep the values after each sweep? `FALSE`, the default, or `TRUE`.
-#' @return An object of class `gym_solution`, which [print()], [as.data.frame()], [predict()] and
-#'   [plot()][plot.gym_solution()] know; a list with the elements
+#' @return An object of class `gym_solution`, with methods for [print()], [as.data.frame()],
+#'   [predict()] and [plot()][plot.gym_solution()]. It is a list with the elements
 #'   \describe{
 #'     \item{values}{The value of each state, a numeric vector with the states' numbers as names;
-#'       with a horizon when all its steps are to go.}
+#'       with a horizon, before its first step.}
 #'     \item{q}{The value of each action in each state, a matrix with a row for each state and a
-#'       column for each action; `-Inf` where it cannot be taken.}
-#'     \item{actions}{The numbers of the actions that are taken, an integer vector; with a horizon a
-#'       matrix with a column for each step, the first being the first step. `NULL` where a policy
-#'       was given.}
-#'     \item{policy}{The policy that plays so, a [policy_table()], or the one given. `NULL` with a
-#'       horizon, because such a policy counts steps.}
-#'     \item{start_value}{The value of the start, a number: the mean of the values over where
-#'       episodes start.}
-#'     \item{limited}{The value of the start when the policy's episodes are cut off after the
-#'       model's `max_episode_steps`, a number; `NULL` where there is no such limit, or with a
-#'       horizon.}
-#'     \item{trace}{The values after each sweep, a matrix with a row for each, of which the first
-#'       are the values 0; `NULL` without `trace = TRUE`.}
-#'     \item{model, discount, horizon, method, sweeps}{As given, and how many sweeps it took.}
+#'       column for each action; `-Inf` for an invalid action.}
+#'     \item{actions}{The numbers of the best actions, an integer vector; with a horizon a matrix
+#'       with a column for each step, in order. `NULL` for a given policy.}
+#'     \item{policy}{The best policy, a [policy_table()], or the given one. `NULL` with a horizon,
+#'       because such a policy counts steps.}
+#'     \item{start_value}{The value of the start, a number: the mean value over the starting
+#'       states.}
+#'     \item{limited}{The value of the start if the policy's episodes are cut off after the model's
+#'       `max_episode_steps`, a number. `NULL` without such a limit or with a horizon.}
+#'     \item{trace}{The values after each sweep, a matrix with a row for each, starting with the
+#'       values 0; `NULL` without `trace = TRUE`.}
+#'     \item{model, discount, horizon, method, sweeps}{As given, and the number of sweeps.}
 #'   }
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, or a model
-#'   whose values have no end: one without an end, or one in which rewards go on for ever, and
-#'   neither a discount below 1 nor a horizon; or one that is too large for the memory, in states
-#'   times actions times transitions of each.
+#' @section Errors: `gym_error_argument` for an invalid argument, or a model with infinite values:
+#'   without an end, or with rewards that go on forever, if there is neither a discount below 1 nor
+#'   a horizon; or for one that is too large for the memory, in states times actions times
+#'   transitions of each.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press, chapter 4.
-#' @seealso [evaluate_policy()][evaluate_policy.gym_model()], which judges several policies by a
+#' @seealso [evaluate_policy()][evaluate_policy.gym_model()], which evaluates several policies by a
 #'   model
 #' @export
 #' @examples
@@ -128,7 +125,7 @@ abort_no_end <- function(model, call) {
   )
 }
 
-# Keeps the values of each sweep, where they are wanted, and the actions.
+# Keeps the values of each sweep, if requested, and the actions.
 new_sweep_notes <- function(backup, trace) {
   notes <- rlang::env(trace = if (trace) list(numeric(backup$states)), choices = list())
   notes$see <- function(values, q) {
@@ -137,7 +134,7 @@ new_sweep_notes <- function(backup, trace) {
   notes
 }
 
-# The sweep after which i steps are to go chooses the action of the i-th step from the end.
+# The sweep after which i steps remain chooses the action of the i-th step from the end.
 solve_horizon <- function(backup, horizon, discount, probabilities, notes, call) {
   best <- is.null(probabilities)
   if (best) {
@@ -189,7 +186,7 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   )
 }
 
-# A policy that takes the actions with the largest probabilities, of the model's spaces.
+# A policy that takes the most likely actions, with the model's spaces.
 table_policy_of <- function(model, probabilities) {
   nowhere <- rowSums(probabilities) == 0
   probabilities[nowhere, 1L] <- 1

@@ -1,22 +1,22 @@
-# Values of a given policy, and best ones: within a number of steps, and without a limit.
+# Values of a given policy, and optimal values: within a number of steps, and without a limit.
 
-# When value iteration ends: no state's value changes by more than this, relative to its size, as
-# far as the discount tells. Where that takes longer, policy iteration goes on.
+# Value iteration ends if no state's value changes by more than this, relative to its size, taking
+# the discount into account. If that takes longer, policy iteration continues.
 sweep_tolerance <- 1e-13
 most_sweeps <- 20000L
 
-# Actions whose values differ by less than this, relative to their size, are equal. But a gain that
-# is smaller still is worth to be taken where it comes often, down to what rounding makes.
+# Actions whose values differ by less than this, relative to their size, are equal. But even a
+# smaller gain is worth taking if it occurs often, down to rounding errors.
 tie_tolerance <- 1e-12
 least_gain <- 1e-14
 
 # Within a number of steps ------------------------------------------------------------
 
-#' Values with some steps to go
+#' Compute values with a number of steps to go
 #'
 #' @param values_of A function of action values that returns those of the states.
 #' @param see A function that is called with the values after each sweep.
-#' @return The values of states when all steps are to go.
+#' @return The values of states with all steps to go.
 #' @noRd
 horizon_values <- function(backup, horizon, discount, values_of, see = function(values, q) NULL) {
   values <- numeric(backup$states)
@@ -30,13 +30,13 @@ horizon_values <- function(backup, horizon, discount, values_of, see = function(
 
 # Of a policy, without a limit -----------------------------------------------------------
 
-#' The values of a policy
+#' Compute the values of a policy
 #'
-#' Solves the policy's linear equations. With a discount of 1 only the states from which episodes
-#' end have equations: those from which the policy never ends have 0 where no reward comes any more,
-#' an infinite value where rewards of one sign come for ever, and otherwise `NaN`.
-#' @return A list: `values`, and `sizes`, what they would be if no reward were negative: by these
-#'   it is judged which differences are only rounding.
+#' Solves the policy's linear equations. With a discount of 1, only states from which episodes end
+#' have equations. A state from which the policy never ends has 0 if it gets no more rewards, an
+#' infinite value if rewards of one sign go on forever, and otherwise `NaN`.
+#' @return A list: `values`, and `sizes`, the values if no reward were negative. Differences are
+#'   compared with these to detect rounding errors.
 #' @noRd
 policy_values <- function(backup, probabilities, discount, call) {
   chain <- chain_of(backup, probabilities)
@@ -47,7 +47,7 @@ policy_values <- function(backup, probabilities, discount, call) {
     leads <- function(reached) times(weight, reached) > 0
     resting <- never_rewarded(chain)
     good <- closure(leads, chain$ends | resting)
-    # Also from a state that can come to the end one that never does may be reached.
+    # A state that can reach the end may also reach one from which it never comes.
     endless <- if (all(good)) !good else closure(leads, !good)
     equations <- good & !resting & !endless
     values[endless] <- endless_values(chain, leads, !good)[endless]
@@ -65,7 +65,7 @@ policy_values <- function(backup, probabilities, discount, call) {
   list(values = values, sizes = sizes)
 }
 
-# The states that no reward follows on, and no end.
+# The states after which neither a reward nor an end comes.
 never_rewarded <- function(chain) {
   resting <- chain$reward == 0 & !chain$ends
   repeat {
@@ -77,7 +77,7 @@ never_rewarded <- function(chain) {
   }
 }
 
-# What comes for ever are the rewards of the states that are always come back to.
+# The rewards that come forever are those of the states that the policy always returns to.
 endless_values <- function(chain, leads, never_ends) {
   returns <- returning_states(chain, never_ends)
   gains <- closure(leads, returns & chain$reward > 0)
@@ -85,18 +85,18 @@ endless_values <- function(chain, leads, never_ends) {
   ifelse(gains & losses, NaN, ifelse(gains, Inf, -Inf))
 }
 
-#' The states that are always come back to
+#' Find the states that a policy always returns to
 #'
-#' They lie in classes from which nothing leads away, and in which every state reaches all others.
-#' The lowest number that a state reaches is the same in all of a class: so the state with this
-#' number reaches it itself, and reaches nothing from which it is not reached again.
-#' @param among A logical vector of states, from which only such states are reached.
+#' They form classes that nothing leaves and in which every state reaches all others. The lowest
+#' number that a state reaches is the same for the whole class, so the state with this number
+#' reaches itself and only states from which it is reached again.
+#' @param among A logical vector of states, which reach only such states.
 #' @noRd
 returning_states <- function(chain, among) {
   inside <- among[chain$from]
   from <- chain$from[inside]
   to <- chain$to[inside]
-  # Of several values that are assigned to a state the last one stays, which is the lowest.
+  # If several values are assigned to a state, the last one stays, which is the lowest.
   lowest <- function(labels) {
     repeat {
       sorted <- order(labels[to], decreasing = TRUE, method = "radix")
@@ -121,10 +121,10 @@ returning_states <- function(chain, among) {
 
 #' Find the best values
 #'
-#' Without a discount two kinds of states are special. Some can rest: stay for ever where no reward
-#' comes, which is worth 0. They get one more action, the last one, that ends the episode for 0. And
-#' from some no policy comes to an end or to rest for sure: these have the value `-Inf`, and no
-#' action that may lead there is taken.
+#' Without a discount two kinds of states are special. Some can rest: stay forever without a reward,
+#' which has the value 0. They get one more action, the last one, which ends the episode with 0.
+#' From others no policy is sure to end or to rest. These have the value `-Inf`, and no action that
+#' may lead there is taken.
 #' @return A list: `values`, `choice` (the number of an action for each state, from 1) and `sweeps`.
 #' @noRd
 best_endless_values <- function(backup, discount, method, see, call) {
@@ -155,15 +155,14 @@ iterate_values <- function(backup, discount, see) {
     see(new, q)
     change <- abs(new - values)
     values <- new
-    # A value that came down to 0 is as accurate as what it came from.
+    # A value that came down to 0 is only as accurate as the values it came from.
     sizes <- pmax(sizes, abs(values))
     if (all(change <= enough * sizes)) break
   }
   list(tied = tied_actions(action_values(backup, values, discount), sizes), sweeps = sweep)
 }
 
-# Where policy iteration starts: a policy that ends where it must, of the actions that are tied, if
-# there are some and they do.
+# The start of policy iteration: a policy that ends if it must, of the tied actions if these do.
 starting_choice <- function(backup, tied, discount) {
   possible <- possible_of(backup)
   ending <- surely_ending(backup, tied %||% possible)
@@ -175,8 +174,9 @@ starting_choice <- function(backup, tied, discount) {
 
 #' Improve a policy until no action is better by more than rounding
 #' @param see As for [horizon_values()].
-#' @param least By how much an action must be better, relative to the size of the values.
-#' @return A list: `values` and `sizes`, `choice`, `tied` (which actions are as good), and `sweeps`.
+#' @param least The smallest improvement, relative to the size of the values.
+#' @return A list: `values` and `sizes`, `choice`, `tied` (which actions are equally good), and
+#'   `sweeps`.
 #' @noRd
 iterate_policies <- function(backup, choice, discount, see, call, least = least_gain) {
   seen <- list()
@@ -206,13 +206,13 @@ iterate_policies <- function(backup, choice, discount, see, call, least = least_
   abort_endless(which.max(abs(values)), call)
 }
 
-# Actions that are worth the same as the best one of their state, up to rounding; `sizes` is what
-# values of each state were added up from.
+# Actions with the same value as the best one of their state, up to rounding. `sizes` are the sizes
+# of the numbers in the sum of each value.
 tied_actions <- function(q, sizes, tolerance = tie_tolerance) {
   q >= row_max(q) - tolerance * pmax(abs(q), sizes) & q > -Inf
 }
 
-# The first of some actions in each state, a logical matrix.
+# The first valid action of each state, a logical matrix.
 first_of <- function(actions) best_column(actions + 0)
 
 possible_of <- function(backup) array(backup$possible, c(backup$states, backup$actions))
@@ -255,7 +255,7 @@ with_rest <- function(backup) {
   list(backup = rested, stays = rest$actions, hopeless = !ending$states & leaves)
 }
 
-# The states that can stay for ever where no reward comes, and the actions by which they do.
+# The states that can stay forever without a reward, and the actions for it.
 resting_actions <- function(backup) {
   shape <- c(backup$states, backup$actions)
   ends <- rowSums(backup$probability * backup$terminated) > 0
@@ -272,16 +272,16 @@ resting_actions <- function(backup) {
   }
 }
 
-# To rest is to take an action that stays where no reward comes.
+# To rest is to take an action that stays without a reward.
 without_rest <- function(choice, backup, task) {
   rests <- choice > backup$actions
   choice[rests] <- first_of(task$stays)[rests]
-  # Where nothing ends all actions are as good.
+  # If nothing ends, all actions are equal.
   choice[task$hopeless] <- first_of(possible_of(backup))[task$hopeless]
   choice
 }
 
-# Rewards above 0 that go on for ever are worth more than anything.
+# Positive rewards that go on forever have an infinite value.
 check_hopeless <- function(backup, hopeless, call) {
   gains <- array(backup$expected > 0, c(backup$states, backup$actions)) & possible_of(backup)
   endless <- hopeless & rowSums(gains) > 0
@@ -292,7 +292,7 @@ check_hopeless <- function(backup, hopeless, call) {
 
 # Choosing among equals ---------------------------------------------------------------
 
-# The tied actions by which episodes end soonest, unless what is lost in each step adds up.
+# The tied actions that end episodes soonest, unless the losses of single steps add up.
 soonest_choice <- function(backup, found, discount, call) {
   choice <- ending_choice(backup, found$tied, call)
   if (identical(choice, found$choice)) {
@@ -304,9 +304,9 @@ soonest_choice <- function(backup, found, discount, call) {
 
 #' Choose an action in each state so that episodes end, and soon
 #'
-#' Where several actions have the same value, some of them may lead in a circle for ever. Of the
-#' actions that are allowed it takes those that bring the end in the fewest steps on average, found
-#' by policy iteration with a cost of 1 for each step.
+#' Some of several actions with the same value may lead in a circle forever. Of the allowed actions
+#' this takes those that reach the end in the fewest steps on average, found by policy iteration
+#' with a cost of 1 for each step.
 #' @param allowed A logical matrix with a row for each state and a column for each action.
 #' @return The number of an action for each state, from 1.
 #' @noRd
@@ -319,19 +319,19 @@ ending_choice <- function(backup, allowed, call) {
   steps$expected <- rep(-1, length(backup$expected))
   steps$possible <- as.vector(ending$allowed)
   found <- iterate_policies(steps, ending$choice, 1, function(values, q) NULL, call)
-  # Differences that are only rounding must not decide, unless there are so many steps that one
-  # more is only rounding, too.
+  # Rounding differences must not decide, unless there are so many steps that one more is only
+  # rounding, too.
   soonest <- first_of(found$tied)
   chosen <- choice_probabilities(steps, soonest) > 0
   ends <- identical(surely_ending(backup, chosen)$states, ending$states)
   ifelse(ending$states, if (ends) soonest else found$choice, ending$choice)
 }
 
-#' The states from which the allowed actions can be so chosen that every episode ends
+#' Find the states from which allowed actions can make every episode end
 #'
 #' @return A list: `states`, a logical vector; `allowed`, the actions that lead to no other states,
-#'   a logical matrix; and `choice`, an action for each state by which every episode ends: one that
-#'   may lead nearer to the end. Where nothing ends it is the first of the allowed ones.
+#'   a logical matrix; and `choice`, an action for each state by which every episode ends, because
+#'   it may lead nearer to the end. If nothing ends, it is the first allowed one.
 #' @noRd
 surely_ending <- function(backup, allowed) {
   shape <- c(backup$states, backup$actions)

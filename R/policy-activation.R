@@ -39,7 +39,7 @@ activate <- function(x, activation) {
   )
 }
 
-# The derivative of an activation, which each of them gives by its output.
+# The derivative of an activation as a function of its output.
 activation_slope <- function(y, activation) {
   switch(activation,
     tanh = 1 - y * y,
@@ -52,13 +52,13 @@ activation_slope <- function(y, activation) {
   )
 }
 
-# Scales outputs that have a range to the range from 0 to 1.
+# Scales bounded outputs to the range from 0 to 1.
 unit_outputs <- function(outputs, activation) {
   if (activation == "tanh") (outputs + 1) / 2 else outputs
 }
 
-# Of a single output: does it stand for the second of two actions? It is that above the middle of
-# its range; without a range above 0. Exactly the middle is the first, as round() gives 0 for 0.5.
+# Does a single output select the second of two actions? It does above the middle of its range, or
+# above 0 if it is unbounded. Exactly the middle selects the first, as round(0.5) is 0.
 above_half <- function(output, activation) {
   switch(activation,
     logistic = , Gompertz = output > 0.5,

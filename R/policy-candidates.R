@@ -1,17 +1,16 @@
-#' Make candidates of a matrix of weights
+#' Make candidates from a matrix of weights
 #'
-#' Candidates are networks of the same sizes and activations that differ in their weights.
-#' [rollout()] and [evaluate_policy()] play all of them at once, which is much faster than playing
-#' one after the other.
+#' Candidates are networks with the same sizes and activations and different weights. [rollout()]
+#' and [evaluate_policy()] play them together, which is much faster than one after the other.
 #'
-#' @param policy A network, made by [policy_network()]: its sizes and activations are those of all
-#'   candidates. Its own weights are not used.
+#' @param policy A network, made by [policy_network()], with the sizes and activations of all
+#'   candidates. Its own weights are ignored.
 #' @param weights A numeric matrix with the weights of a candidate in each row, in the order of
-#'   [coef()][coef.gym_policy_network]. Names of rows are the candidates' names.
+#'   [coef()][coef.gym_policy_network]. Row names are the candidates' names.
 #' @return An object of class `gym_policy_candidates`, a list with the elements `policy` and
-#'   `weights`. [coef()][coef.gym_policy_network] gives the matrix.
-#' @section Errors: `gym_error_argument` when `policy` is no network, or `weights` not a matrix of
-#'   as many columns as the network has weights, without missing values.
+#'   `weights`. [coef()][coef.gym_policy_network] returns the matrix.
+#' @section Errors: `gym_error_argument` if `policy` is not a network, or if `weights` is not a
+#'   matrix without missing values with a column for each of the network's weights.
 #' @export
 #' @examples
 #' policy <- policy_network(c(4, 1))
@@ -63,10 +62,10 @@ format.gym_policy_candidates <- function(x, ...) {
 
 # Several policies that play side by side ----------------------------------------------
 
-#' Give the policy of some candidates
+#' Get the policy of some candidates
 #'
 #' @param candidates Their numbers, in increasing order.
-#' @return A policy that has these candidates alone; of a single one the policy itself.
+#' @return A policy with these candidates only; for a single one, its own policy.
 #' @noRd
 policy_subset <- function(policy, candidates) UseMethod("policy_subset")
 
@@ -89,10 +88,10 @@ policy_subset.gym_policy_list <- function(policy, candidates) {
   if (length(policies) == 1L) policies[[1L]] else policy_list(policies)
 }
 
-#' Give the policy that acts for rows of observations
+#' Get the policy that acts for rows of observations
 #'
-#' @param candidate Which candidate acts for each row.
-#' @param sub_env Which sub-environment each row is.
+#' @param candidate The candidate that acts for each row.
+#' @param sub_env The sub-environment of each row.
 #' @return A policy for [act_batch()].
 #' @noRd
 policy_rows <- function(policy, candidate, sub_env) UseMethod("policy_rows")
@@ -100,7 +99,7 @@ policy_rows <- function(policy, candidate, sub_env) UseMethod("policy_rows")
 #' @exportS3Method
 policy_rows.default <- function(policy, candidate, sub_env) policy
 
-# How many candidates there are, `NULL` for a policy that is none of several.
+# The number of candidates, `NULL` for a single policy.
 count_candidates <- function(policy) {
   if (inherits(policy, "gym_policy_candidates")) {
     nrow(policy$weights)
@@ -109,7 +108,7 @@ count_candidates <- function(policy) {
   }
 }
 
-# Their names, which must tell them apart; `NULL` where they have none.
+# Their names, which must be unique, or `NULL`.
 candidate_names <- function(policy) {
   names <- if (inherits(policy, "gym_policy_candidates")) {
     rownames(policy$weights)
@@ -157,10 +156,10 @@ act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
   network_action(network$action_space, signal, network, one = FALSE)
 }
 
-#' Sum inputs with weights of their own for each row
+#' Sum inputs with other weights for each row
 #'
-#' @param weights In each row the weight matrix of a layer, column after column: all
-#'   outputs of the first input, then those of the next.
+#' @param weights In each row the weight matrix of a layer, column after column: all outputs of the
+#'   first input, then those of the next.
 #' @return A matrix with one column for each output.
 #' @noRd
 sum_weighted <- function(signal, weights) {

@@ -1,21 +1,21 @@
 #' Get and set the weights of a policy
 #'
-#' `coef()` gives the weights of a network as one numeric vector, `coef(policy) <- w` sets them.
-#' So anything that works on vectors works on policies: averages of policies, noise around one,
-#' [stats::optim()].
+#' `coef()` returns the weights of a network as one numeric vector, and `coef(policy) <- w` sets
+#' them. Use it to apply any function of vectors to policies: averages of policies, noise around
+#' one, [stats::optim()].
 #'
 #' The order is that in which [policy_network()] draws them: layer after layer, each matrix column
-#' after column, that is first the weights of the first input. Of a network with the output
-#' `"gaussian"` the logarithms of its standard deviations follow, one for each output.
+#' after column, starting with the weights of the first input. A network with the output
+#' `"gaussian"` has the logarithms of its standard deviations at the end, one for each output.
 #'
-#' @param object A network, made by [policy_network()] or found by a search; or candidates, made
-#'   by [policy_candidates()].
+#' @param object A network, made by [policy_network()] or found by a search; or candidates, made by
+#'   [policy_candidates()].
 #' @param ... Not used.
-#' @param value The new weights, a numeric vector with one number for each; for candidates a matrix
-#'   as [policy_candidates()] takes it.
-#' @return `coef()` a numeric vector; for candidates a matrix with the weights of a candidate in
-#'   each row. `coef<-` the policy with the new weights.
-#' @section Errors: `gym_error_argument` for a policy without weights, a wrong number of weights and
+#' @param value The new weights, a numeric vector; for candidates a matrix as for
+#'   [policy_candidates()].
+#' @return `coef()` returns a numeric vector; for candidates a matrix with the weights of a
+#'   candidate in each row. `coef<-` returns the policy with the new weights.
+#' @section Errors: `gym_error_argument` for a policy without weights, a wrong number of weights or
 #'   missing values.
 #' @export
 #' @examples

@@ -1,16 +1,16 @@
-# Policies that are data: numbers and a few words, which a server can play without asking R. The
-# wire keeps numbers in C order, each network's weights in that of coef().
+# Policies that are data: numbers and a few words, which a server can play without R. They are sent
+# with numbers in C order and with each network's weights in the order of coef().
 
-#' Take a policy apart into data
+#' Convert a policy to data
 #'
 #' @param policy A policy that is bound to the environment, or several candidates.
-#' @param env The environment, of which the action space is looked at.
+#' @param env The environment, for its action space.
 #' @return A list: `document`, a list for JSON, and `tensors`, a named list of numeric vectors and
-#'   arrays. `NULL` for a policy that is no data: a function, a model, one with a memory, a class of
-#'   the user's own.
+#'   arrays. `NULL` for a policy that is not data: a function, a model, one with a memory, or a
+#'   user's class.
 #' @noRd
 policy_data <- function(policy, env) {
-  # A class that builds on one of these may act by a method of its own.
+  # A subclass may have its own method to act.
   if (class(policy)[[1L]] %in% data_classes) data_of_policy(policy, env)
 }
 

@@ -1,27 +1,27 @@
 #' Describe observations by features
 #'
-#' A learner keeps values in a table with a row for each observation. Where observations are numbers
-#' of a range there are too many of them, and what is learned is a weight for each of some features
-#' instead: the value of an action is the sum of its weights, each times its feature (Sutton and
-#' Barto 2018, chapter 9). Any function that gives an observation's features can be given to a
-#' learner; `tile_coding()` makes one that serves well where observations have few numbers.
+#' A learner keeps values in a table with a row for each observation. Continuous observations are
+#' too many for a table. Instead, the learner learns a weight for each of some features; the value
+#' of an action is the sum of its weights times the features (Sutton and Barto 2018, chapter 9). Any
+#' function that computes features of an observation works. `tile_coding()` makes one that works
+#' well if observations have few numbers.
 #'
-#' Tile coding lays several grids over the range of observations, each a little beside the others
-#' (Sutton and Barto 2018, section 9.5.4). A feature is a tile: 1 for the one of each grid in which
-#' an observation lies, and 0 for all others. Numbers outside of the range lie in the tiles at its
-#' ends. The grids are displaced against each other by 1, 3, 5, ... parts of a tile in the first,
-#' second, third, ... number.
+#' Tile coding covers the range of observations with several grids that are shifted against each
+#' other (Sutton and Barto 2018, section 9.5.4). A feature is a tile: 1 for the tile of each grid
+#' that contains the observation, 0 for all others. Numbers outside the range belong to the
+#' outermost tiles. The grids are shifted by 1, 3, 5, ... parts of a tile in the first, second,
+#' third, ... number.
 #'
-#' @param tilings How many grids there are, a whole number of at least 1; the default is 8.
-#' @param bins How many tiles a grid has for each number of an observation: a whole number of at
-#'   least 1, 8 by default, or one for each number.
-#' @param low,high The range of each number, numeric vectors; `NULL`, the default, is that of the
-#'   observation space, where it has bounds. Of the numbers of a Discrete each takes up 1: with
-#'   `tilings = 1` the states are put together in `bins` groups (state aggregation).
-#' @return `tile_coding()` an object of class `gym_features`, for the argument `features` of
-#'   [learn_q()] and the others.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be; when it is
-#'   played in an environment whose observations have no bounds, or are no numbers.
+#' @param tilings The number of grids, a whole number of at least 1. The default is 8.
+#' @param bins The number of tiles of a grid along each number of an observation: a whole number of
+#'   at least 1, 8 by default, or one for each number.
+#' @param low,high The range of each number, numeric vectors. `NULL`, the default, uses the bounds
+#'   of the observation space. The numbers of a Discrete space have the width 1: with `tilings = 1`
+#'   the states form `bins` groups (state aggregation).
+#' @return An object of class `gym_features`, for the argument `features` of [learn_q()] and other
+#'   learners.
+#' @section Errors: `gym_error_argument` for an invalid argument, or, when it is played, for
+#'   observations that are not numbers or have no bounds.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
 #' @export
@@ -59,16 +59,16 @@ print.gym_features <- function(x, ...) {
 
 # What values are linear in -----------------------------------------------------------
 
-#' Describe what the values of an environment's observations are linear in
+#' Describe the features of an environment's observations
 #'
-#' Of a table and of tiles only few features of an observation are 1 and all others 0: then `of()`
-#' returns a matrix with a row for each observation and the numbers of these in it, of which there
-#' are `each`. Of a user's function it returns the features themselves, and `each` is `NULL`.
-#' @param features `NULL` for a table, what [tile_coding()] makes, or a function.
-#' @return A list: `count`, how many features there are, `each`, `of`, a function of a batch of
-#'   observations and how many they are, `one`, a function of a batch of a single one that returns
-#'   its row as a vector, and `features`, as given. `count` is `NA` for a function that was not
-#'   asked yet.
+#' With a table or tiles only few features of an observation are 1 and all others 0. Then `of()`
+#' returns a matrix with a row for each observation and the numbers of these features in it; there
+#' are `each` of them. For a user's function it returns the features themselves, and `each` is
+#' `NULL`.
+#' @param features `NULL` for a table, the result of [tile_coding()], or a function.
+#' @return A list: `count`, the number of features, `each`, `of`, a function of a batch of
+#'   observations and their number, `one`, a function of a batch of one that returns its row as a
+#'   vector, and `features`, as given. `count` is `NA` for a function that was not called yet.
 #' @noRd
 basis_of <- function(features, space, call) {
   if (is.null(features)) {
@@ -121,7 +121,7 @@ tiles_of <- function(features, space, call) {
   }
   bins <- rep_len(features$bins, numbers)
   tilings <- features$tilings
-  # One tile more than bins, because all grids but the first are displaced.
+  # One tile more than bins, because all grids but the first are shifted.
   weights <- c(1, cumprod(bins + 1))
   per_tiling <- weights[[numbers + 1L]]
   if (per_tiling * tilings > most_values) {
@@ -167,7 +167,7 @@ tiles_of <- function(features, space, call) {
   list(count = per_tiling * tilings, each = tilings, of = of, one = one, features = features)
 }
 
-# The range of each number of an observation. A Discrete's numbers take up 1 each.
+# The range of each number of an observation. The numbers of a Discrete space have the width 1.
 tiled_range <- function(space, features, call) {
   if (inherits(space, "gym_space_discrete")) {
     return(list(low = as.double(space$start), high = as.double(space$start) + as.double(space$n)))
@@ -182,9 +182,9 @@ tiled_range <- function(space, features, call) {
   list(low = as.numeric(space$low), high = as.numeric(space$high))
 }
 
-#' The value of each action for some observations
+#' Compute the value of each action for some observations
 #' @param weights A matrix with a row for each feature and a column for each action.
-#' @param present The features of the observations, as `of()` of the basis returns them.
+#' @param present The features of the observations, as returned by `of()` of the basis.
 #' @noRd
 linear_values <- function(basis, weights, present) {
   if (is.null(basis$each)) {

@@ -14,10 +14,10 @@ check_takes_observations <- function(policy, arg, call) {
   }
 }
 
-#' Ask a function about one observation before the first step
+#' Call a function with one observation before the first step
 #'
-#' A function that cannot answer about a single observation would otherwise fail only when a single
-#' episode is left and most has been played.
+#' A function that fails for a single observation would otherwise fail late, when only one episode
+#' is still running.
 #' @param one A batch of one observation.
 #' @noRd
 ask_about_one <- function(policy, one, vector_env) {
@@ -30,7 +30,7 @@ ask_about_one <- function(policy, one, vector_env) {
           i = observations_hint(vector_env$observation_space),
           i = paste("There may be only one, as when all episodes but one have ended;",
                     "`drop = FALSE` keeps one row of a matrix a matrix.")),
-        # The classes of the policy's own error stay, so that it can be caught by them.
+        # Keep the classes of the policy's own error, so that users can catch it by them.
         class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
                   "gym_error_argument"),
         argument = "policy", value = policy, call = vector_env$call,
@@ -40,7 +40,7 @@ ask_about_one <- function(policy, one, vector_env) {
   )
 }
 
-#' Convert what a function returned to the form of a batch of actions
+#' Convert the result of a function to a batch of actions
 #'
 #' Checks that there is one action for each sub-environment. The environment checks whether each is
 #' an action of its space.
@@ -70,7 +70,7 @@ abort_action_count <- function(actions, count, n, vector_env) {
   )
 }
 
-# Hints for a function that was written for a single observation.
+# Hints for a function written for a single observation.
 observations_hint <- function(space) {
   if (inherits(space, "gym_space_discrete") || inherits(space, "gym_space_text")) {
     "It is asked about many observations at once: `observation` is a vector of them."

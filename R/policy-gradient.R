@@ -1,38 +1,38 @@
 #' Differentiate a network by hand
 #'
-#' What it takes to write an agent that climbs a gradient: how likely a policy's actions were, and
-#' how that changes with the weights. Both are calculated by matrix algebra, without automatic
+#' Use these functions to write an agent that follows a gradient. They compute how likely a policy's
+#' actions were, and how that changes with the weights, by matrix algebra and without automatic
 #' differentiation.
 #'
 #' `policy_log_prob()` and `policy_log_prob_gradient()` are for a [policy_network()] with the output
-#' `"softmax"`, whose actions have probabilities, or `"gaussian"`, whose actions have densities:
-#' those of the numbers that were drawn, not of those that were cut at the action's bounds.
+#' `"softmax"`, whose actions have probabilities, or `"gaussian"`, whose actions have densities.
+#' These are the densities of the drawn numbers, before they are cut at the bounds of the action.
 #'
-#' `policy_output_gradient()` is for any network, such as one of values:
-#' `policy_network(c(4, 64, 1), c("tanh", "identity"))` has one output, `predict(type = "output")`
-#' gives it, and this is its gradient.
+#' `policy_output_gradient()` is for any network, such as a value network:
+#' `policy_network(c(4, 64, 1), c("tanh", "identity"))` has one output. `predict(type = "output")`
+#' returns this output, and `policy_output_gradient()` its gradient.
 #'
 #' @param policy A network.
 #' @param observation Observations, as for [act()]: a matrix with one in each row, or a single one.
-#' @param action An action for each observation: a vector of whole numbers of a Discrete action
-#'   space (from 0 where the policy has not been played); for a Box a matrix with an action in each
+#' @param action An action for each observation. For a Discrete action space a vector of whole
+#'   numbers (from 0 if the policy has not been played); for a Box a matrix with an action in each
 #'   row.
-#' @param weights How much each observation counts, a numeric vector, or one number for all; of
-#'   `policy_output_gradient()` for a network with several outputs a matrix with a row for each
+#' @param weights The weight of each observation, a numeric vector, or one number for all. For
+#'   `policy_output_gradient()` and a network with several outputs, a matrix with a row for each
 #'   observation and a column for each output. The default is 1.
-#' @return `policy_log_prob()` a numeric vector with the natural logarithm of a probability (or
-#'   density) for each observation. The others a numeric vector aligned with
+#' @return `policy_log_prob()` returns a numeric vector with the natural logarithm of a probability
+#'   (or density) for each observation. The other two return a numeric vector in the order of
 #'   [coef()][coef.gym_policy_network]: the gradient of the sum of `weights` times the logarithms,
-#'   or times the outputs. Its mean, such as the policy gradient of Sutton and Barto (2018, chapter
-#'   13) is, has `weights` that are divided by the number of observations.
-#' @section Errors: `gym_error_argument` for a policy that is no such network, and for observations,
-#'   actions and weights that do not fit it and each other.
+#'   or times the outputs. Divide `weights` by the number of observations to get the gradient of a
+#'   mean, such as the policy gradient of Sutton and Barto (2018, chapter 13).
+#' @section Errors: `gym_error_argument` for another kind of policy, or if observations, actions and
+#'   weights do not fit the policy and each other.
 #' @references R. J. Williams (1992), Simple statistical gradient-following algorithms for
 #'   connectionist reinforcement learning, Machine Learning 8.
 #'
 #'   R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second edition,
 #'   MIT Press.
-#' @seealso [agent_reinforce()] and [agent_ppo()], which are made of these formulas
+#' @seealso [agent_reinforce()] and [agent_ppo()], which use these formulas
 #' @export
 #' @examples
 #' set.seed(1)
@@ -76,17 +76,17 @@ policy_output_gradient <- function(policy, observation, weights = 1) {
   gradient <- backward_network(
     forward_network(policy, weight_vector(policy), seen), t(weights)
   )
-  # The outputs do not depend on standard deviations.
+  # The outputs do not depend on the standard deviations.
   c(gradient, if (is_gaussian(policy)) numeric(length(policy$log_std)))
 }
 
 # The formulas --------------------------------------------------------------------------------
 
-#' Compute how likely actions are
+#' Compute the log-probabilities of actions
 #' @param outputs A matrix with a column for each observation.
 #' @param log_std The logarithms of standard deviations.
-#' @param chosen As action_places() returns it.
-#' @return A list: `log_prob` and `entropy`, vectors, and what their derivatives are made of.
+#' @param chosen As returned by action_places().
+#' @return A list: `log_prob` and `entropy`, vectors, and the parts of their derivatives.
 #' @noRd
 log_prob_of <- function(policy, outputs, log_std, chosen) {
   n <- ncol(outputs)
@@ -109,8 +109,8 @@ log_prob_of <- function(policy, outputs, log_std, chosen) {
 }
 
 #' Compute the derivatives of log-probabilities and entropies
-#' @param weights,of_entropy The derivatives of what is differentiated in each log-probability, and
-#'   in each entropy.
+#' @param weights,of_entropy The derivatives of the objective with respect to each log-probability,
+#'   and each entropy.
 #' @return A list: `outputs`, a matrix, and `log_std`, `NULL` for a softmax.
 #' @noRd
 log_prob_slopes <- function(policy, parts, weights, of_entropy = 0) {
@@ -148,8 +148,8 @@ seen_columns <- function(policy, observation, call = rlang::caller_env()) {
 }
 
 #' Find the actions among the outputs
-#' @return For a softmax the places of the actions' outputs in a matrix with a column for each
-#'   observation, for a Gaussian a matrix with an action in each column.
+#' @return For a softmax, the places of the actions' outputs in a matrix with a column for each
+#'   observation; for a Gaussian, a matrix with an action in each column.
 #' @noRd
 action_places <- function(policy, action, n, call = rlang::caller_env()) {
   action <- plain_numbers(action, "action", call)
@@ -161,7 +161,7 @@ action_places <- function(policy, action, n, call = rlang::caller_env()) {
     abort_argument(action, must, "action", call)
   }
   if (is_gaussian(policy)) {
-    # Of an action with several dimensions the numbers are taken row by row.
+    # The numbers of an action with several dimensions are taken row by row.
     return(matrix(row_major(action), outputs))
   }
   start <- policy$action_space$start %||% 0L
@@ -173,8 +173,8 @@ action_places <- function(policy, action, n, call = rlang::caller_env()) {
   places_of_actions(outputs, as.integer(at))
 }
 
-# Actions from 1 as places in a matrix with so many outputs in each column; the numbers of a Box as
-# they are.
+# Converts actions from 1 to places in a matrix with so many outputs in each column. The numbers of
+# a Box stay as they are.
 places_of_actions <- function(outputs, action) {
   if (is.matrix(action)) action else (seq_along(action) - 1L) * outputs + action
 }

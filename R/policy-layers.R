@@ -1,10 +1,10 @@
-# The layers of a network for gradients by hand: forwards with what each layer gives kept, and
-# backwards from the outputs' derivatives to those of the weights. Observations are columns here, so
-# that a minibatch is cut out of memory in one piece and a bias is added to each column by R's own
-# recycling; network_outputs() has them in rows, as users do.
+# The layers of a network for manual gradients: forwards, keeping the output of each layer, and
+# backwards from the derivatives of the outputs to those of the weights. Observations are columns
+# here: a minibatch is then a contiguous piece of memory, and R's recycling adds a bias to each
+# column. network_outputs() has them in rows, like users.
 
-#' Cut a vector of weights into layers
-#' @param policy A network, of which the sizes count, not the weights.
+#' Split a vector of weights into layers
+#' @param policy A network, for its sizes. Its own weights are ignored.
 #' @param weights Its weights, in the order of `coef()`.
 #' @return A list with a list for each layer: `weights`, a matrix with a row for each neuron, `bias`
 #'   (`NULL` for none).
@@ -14,7 +14,7 @@ layers_of <- function(policy, weights) {
   bias <- isTRUE(policy$bias)
   layers <- vector("list", length(sizes) - 1L)
   end <- 0L
-  # A loop, as this is done anew for each minibatch.
+  # A loop, because this runs for each minibatch.
   for (i in seq_along(layers)) {
     neurons <- sizes[[i + 1L]]
     count <- neurons * sizes[[i]]
@@ -27,12 +27,12 @@ layers_of <- function(policy, weights) {
   layers
 }
 
-#' Compute what each layer gives
+#' Compute the output of each layer
 #' @inheritParams layers_of
-#' @param inputs A matrix with an observation in each column, as network_columns() returns it.
-#' @return A list: `outputs`, a matrix with a column for each observation, and what
-#'   backward_network() needs, `layers`, `activation` and `signals` (the inputs, then the outputs of
-#'   each layer).
+#' @param inputs A matrix with an observation in each column, as returned by network_columns().
+#' @return A list: `outputs`, a matrix with a column for each observation, and the arguments of
+#'   backward_network(): `layers`, `activation` and `signals` (the inputs, then the outputs of each
+#'   layer).
 #' @noRd
 forward_network <- function(policy, weights, inputs) {
   layers <- layers_of(policy, weights)
@@ -54,12 +54,12 @@ forward_network <- function(policy, weights, inputs) {
   )
 }
 
-# In half the time of tanh(), which is a third of an update's, and 4e-16 from it at most.
+# Twice as fast as tanh(), which takes a third of an update, with an error of at most 4e-16.
 quick_tanh <- function(x) 1 - 2 / (exp(x + x) + 1)
 
 #' Compute the derivatives of the weights
-#' @param forward As forward_network() returns it.
-#' @param slopes The derivatives of the outputs, a matrix as they are.
+#' @param forward As returned by forward_network().
+#' @param slopes The derivatives of the outputs, a matrix of the same shape.
 #' @return A vector in the order of `coef()`: the sums over all observations.
 #' @noRd
 backward_network <- function(forward, slopes) {
@@ -80,7 +80,7 @@ backward_network <- function(forward, slopes) {
   unlist(gradient)
 }
 
-#' Put observations into the columns of a matrix, as the network takes them in
+#' Put observations into the columns of a matrix, prepared for the network
 #' @param values A matrix with an observation in each row.
 #' @noRd
 network_columns <- function(policy, values, call = rlang::caller_env()) {

@@ -1,22 +1,22 @@
-#' Decide by weighted sums of the observation
+#' Act by weighted sums of the observation
 #'
-#' Makes a network without hidden neurons, whose outputs are weighted sums of the observation's
-#' numbers. That is enough for many environments, MuJoCo's robots among them (Mania, Guy and Recht
-#' 2018; Rajeswaran et al. 2017). It has as many inputs and outputs as the environment that it
-#' plays, and its weights are 0 until a search finds others.
+#' Make a network without hidden neurons, whose outputs are weighted sums of the observation's
+#' numbers. That is enough for many environments, including MuJoCo's robots (Mania, Guy and Recht
+#' 2018; Rajeswaran et al. 2017). The environment determines the numbers of inputs and outputs. All
+#' weights are 0 until a search finds others.
 #'
-#' An action is made of the outputs as [policy_network()] tells for outputs without a range: of
-#' several actions the one with the largest output, of two the second where the only output is above
-#' 0, and the numbers of a Box are the outputs, cut at its bounds.
+#' The outputs determine the action as for unbounded outputs of [policy_network()]. With several
+#' actions it takes the one with the largest output. With two actions and one output it takes the
+#' second if the output is above 0. The numbers of a Box are the outputs, cut at its bounds.
 #'
 #' @inheritParams policy_network
-#' @param weights The weights, a matrix with one row for each output and one column for each number
-#'   of an observation, and with `bias = TRUE` one more for the constant. `NULL`, the default: all
-#'   are 0.
+#' @param weights A matrix with one row for each output and one column for each number of an
+#'   observation, and one more column for the constant with `bias = TRUE`. `NULL`, the default, sets
+#'   all weights to 0.
 #' @return A policy of class `gym_policy_network`, see [policy_network()], with the activation
-#'   `"identity"`. Its sizes are `NA` and its `weights` `NULL` until it is played, unless weights
-#'   were given.
-#' @section Errors: `gym_error_argument` when `weights` is no numeric matrix or has missing values.
+#'   `"identity"`. Unless you give weights, its sizes are `NA` and its `weights` `NULL` until it is
+#'   played.
+#' @section Errors: `gym_error_argument` if `weights` is not a numeric matrix or has missing values.
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31.
 #'

@@ -1,33 +1,33 @@
-# Policies with a memory: what they saw or did before goes into what they do next.
+# Policies with a memory: earlier observations or actions influence the next action.
 #
-# The package keeps the memory, a row for each sub-environment, so that episodes which are played
-# side by side do not see each other's, and each episode begins with the same one.
+# The package keeps the memory, a row for each sub-environment. Episodes that are played together do
+# not share it, and each episode starts with the same one.
 
 #' Make a policy with a memory
 #'
-#' A policy that needs what it saw before: a PID controller, a moving average, a small recurrent
-#' network. The package keeps one memory for each episode and begins every episode with `initial`,
-#' so episodes never see each other's memory, however many are played side by side.
+#' Make a policy that uses earlier observations: a PID controller, a moving average, a small
+#' recurrent network. The package keeps one memory for each episode and starts every episode with
+#' `initial`, so episodes never share a memory, even if they are played together.
 #'
-#' Such a policy plays step by step from R, wherever [rollout()] and [evaluate_policy()] play:
-#' environments on a server, [environments in R][gym_env()], workers, and in a list with other
-#' policies. [saveRDS()] keeps it as it keeps a function.
+#' Such a policy always plays step by step from R. It works everywhere that [rollout()] and
+#' [evaluate_policy()] play: environments on a server, [environments in R][gym_env()], workers, and
+#' in a list with other policies. [saveRDS()] saves it like a function.
 #'
-#' A plain function that remembers something by `<<-` is not enough: [rollout()] asks it about
-#' several episodes in one call, and one episode would begin with what the last one left.
-#' `rollout()` warns when it notices this.
+#' A plain function that remembers something by `<<-` does not work. [rollout()] passes it several
+#' episodes in one call, and a new episode would start with the memory of another. `rollout()` warns
+#' if it notices this.
 #'
-#' @param act A function of `observation` and `memory`. `observation` has many observations, as in
-#'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows: a
-#'   matrix when `initial` is a vector, a data frame when it is a list or a data frame. It returns
-#'   `list(action = , memory = )`: an action for each observation, and the new memory, with the
-#'   rows and columns that it was given.
-#' @param initial The memory at the beginning of an episode: a numeric vector (its names become
-#'   the names of columns), or a list or data frame of one row.
-#' @return A policy, of class `gym_policy_memory`. `act(policy, observation, memory)` returns the
-#'   list that the function returns; without `memory` it begins with `initial`.
-#' @section Errors: `gym_error_argument` when `act` is no such function or `initial` is no such
-#'   memory; from whatever plays the policy, when `act` does not return the list described above.
+#' @param act A function of `observation` and `memory`. `observation` has many observations, as for
+#'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows.
+#'   It is a matrix if `initial` is a vector, and a data frame if `initial` is a list or a data
+#'   frame. The function returns `list(action = , memory = )`: an action for each observation, and
+#'   the new memory with the same rows and columns.
+#' @param initial The memory at the start of an episode: a numeric vector (its names become column
+#'   names), or a list or data frame of one row.
+#' @return A policy of class `gym_policy_memory`. `act(policy, observation, memory)` returns the
+#'   list that the function returns; without `memory` it starts with `initial`.
+#' @section Errors: `gym_error_argument` for an invalid `act` or `initial`, and, while it is played,
+#'   if `act` does not return the list described above.
 #' @export
 #' @examples
 #' # A PID controller that holds the pole of CartPole upright.
@@ -86,8 +86,8 @@ format.gym_policy_memory <- function(x, ...) {
 }
 
 #' @rdname act
-#' @param memory For a [policy with a memory][policy_memory()]: what it returned as `memory` in the
-#'   step before.
+#' @param memory For a [policy with a memory][policy_memory()]: the `memory` that it returned in the
+#'   previous step.
 #' @export
 act.gym_policy_memory <- function(policy, observation, memory = NULL, ...) {
   observation <- function_rows(observation)
@@ -98,7 +98,7 @@ act.gym_policy_memory <- function(policy, observation, memory = NULL, ...) {
 
 fresh_memory <- function(policy, n) policy$initial[rep(1L, n), , drop = FALSE]
 
-# What the function says, checked.
+# Calls the function and checks its result.
 asked_with_memory <- function(policy, observation, memory, call) {
   said <- policy$act(observation, memory)
   new <- if (is.list(said)) said[["memory"]]
@@ -133,7 +133,7 @@ abort_memory <- function(value, must, call) {
 # While it plays ---------------------------------------------------------------------------
 
 #' Give each sub-environment of a batch a memory
-#' @return The policy. One with a memory has `kept`, an environment with the `memory` of all
+#' @return The policy. One with a memory gets `kept`, an environment with the `memory` of all
 #'   sub-environments.
 #' @noRd
 with_memory <- function(policy, num_envs) {
@@ -147,7 +147,7 @@ with_memory <- function(policy, num_envs) {
   }
 }
 
-# Episodes begin in these sub-environments.
+# Episodes start in these sub-environments.
 begin_memory <- function(policy, sub_env) {
   if (inherits(policy, "gym_policy_list")) {
     lapply(unclass(policy), begin_memory, sub_env)
@@ -182,10 +182,10 @@ act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
 
 # Functions that remember ------------------------------------------------------------------
 
-#' Watch what a function keeps outside of itself
+#' Watch the variables that a function uses outside itself
 #'
-#' @return A function that says which variables of the function's environment, or of the global one,
-#'   have changed since.
+#' @return A function that returns the names of the variables, in the function's environment or the
+#'   global one, that have changed since.
 #' @noRd
 watch_variables <- function(policy) {
   used <- all.names(body(policy))
@@ -207,8 +207,8 @@ watch_variables <- function(policy) {
   }
 }
 
-# Objects that are environments stand for something outside of R, and change for reasons of their
-# own. Of other environments the contents count.
+# Objects that are environments represent something outside R and change for their own reasons.
+# Other environments are compared by their contents.
 variables_now <- function(place, names) {
   names <- intersect(names, names(place))
   names <- names[!vapply(names, bindingIsActive, NA, env = place)]

@@ -1,44 +1,44 @@
-#' Make a policy of a fitted model
+#' Make a policy from a fitted model
 #'
-#' What a model predicts becomes the action. So a policy can be learned from steps that another one
-#' played: fit a model of the action, given the parts of the observation, and play it.
+#' The model's prediction becomes the action. You can learn a policy from the steps of another one:
+#' fit a model of the action, given the parts of the observation, and play it.
 #'
 #' # Observations
 #'
-#' The model is asked about a data frame with a row for each observation, whose columns are named as
-#' in the table of steps of a [rollout()]. A model without a formula (no `terms()`), such as
-#' `nnet::nnet(x, y)`, is asked about a matrix with these columns.
+#' The model gets a data frame with a row for each observation and the column names of the table of
+#' steps of a [rollout()]. A model without a formula (no `terms()`), such as `nnet::nnet(x, y)`,
+#' gets a matrix with these columns.
 #'
 #' # From a prediction to an action
 #'
-#' Where actions are discrete:
+#' For discrete actions:
 #'
-#' - A factor or a string is the action with this label: its number, such as `"1"`, or what
-#'   Gymnasium's documentation calls it, such as `"push left"`. The codes of a factor do not matter.
+#' - A factor or a string is the action with this label: its number, such as `"1"`, or its name in
+#'   Gymnasium's documentation, such as `"push left"`. The codes of a factor are ignored.
 #' - `TRUE` is action 1, `FALSE` action 0.
-#' - A whole number is the action itself, any other number stands for the action nearest to it,
-#'   half way for the lower one. So a probability above one half is action 1.
-#' - A binomial [glm()] of a factor gives the second of its two levels where that one's probability
-#'   is above one half.
-#' - [nnet::nnet()] with several outputs gives the action with the largest, of equal ones the first.
+#' - A whole number is the action itself. Any other number selects the nearest action, or the lower
+#'   one of two. So a probability above one half selects action 1.
+#' - A binomial [glm()] of a factor selects the second level if its probability is above one half.
+#' - [nnet::nnet()] with several outputs selects the action with the largest output, or the first of
+#'   equal ones.
 #'
-#' Where actions are a Box, predictions are the actions: a numeric vector or, for actions of several
-#' numbers, a matrix with an action in each row, as [lm()] of `cbind(action_1, action_2)` gives it.
+#' If actions are a Box, predictions are the actions: a numeric vector or, for actions of several
+#' numbers, a matrix with an action in each row, as from [lm()] of `cbind(action_1, action_2)`.
 #'
-#' @param x A fitted model for which there is a method of [predict()], for instance of [lm()],
-#'   [glm()], `rpart::rpart()` or `nnet::nnet()`. Policies and functions of observations come back
-#'   as they are; of a search or a rollout it is the policy.
+#' @param x A fitted model with a method for [predict()], for instance of [lm()], [glm()],
+#'   `rpart::rpart()` or `nnet::nnet()`. Policies and functions of observations are returned
+#'   unchanged. A search or a rollout returns its policy.
 #' @param ... Further arguments of the model's `predict()`.
-#' @param type What `predict()` is to give, a string. For a [glm()] the default is `"response"`; for
+#' @param type The `type` for `predict()`, a string. The default for a [glm()] is `"response"`; for
 #'   `rpart::rpart()` `"class"` for a classification, otherwise `"vector"`; for `nnet::nnet()`
-#'   `"class"` where it was fitted to a factor, otherwise `"raw"`. Other models' `predict()` gets
-#'   none, unless it is named.
-#' @return A policy; of a model one of class `gym_policy_model`, a list with the elements `model`,
-#'   `arguments` (a list: what `predict()` gets), `labels` (the two levels of a binomial [glm()]'s
+#'   `"class"` if it was fitted to a factor, otherwise `"raw"`. Other models get no `type` by
+#'   default.
+#' @return A policy; for a model one of class `gym_policy_model`, a list with the elements `model`,
+#'   `arguments` (a list: those of `predict()`), `labels` (the two levels of a binomial [glm()]'s
 #'   factor, otherwise `NULL`), `package` (the package of its method, a string or `NULL`),
 #'   `observation_space`, `action_space` and `env_id` (`NULL` until it is played).
-#' @section Errors: `gym_error_argument` when there is no method of `predict()`; while it is played,
-#'   when `predict()` fails, or gives what no action is.
+#' @section Errors: `gym_error_argument` if there is no method for `predict()`, or, while it is
+#'   played, if `predict()` fails or its result is not an action.
 #' @export
 #' @examples
 #' # A model of any kind that predicts: here one that was fitted to made-up data.
@@ -114,8 +114,8 @@ as_policy.nnet <- function(x, ..., type = NULL) {
   new_model_policy(x, list(type = type, ...))
 }
 
-#' Make a policy of a model
-#' @param labels The two levels that a probability tells apart; `NULL` for other predictions.
+#' Make a policy from a model
+#' @param labels The two levels that a probability distinguishes; `NULL` for other predictions.
 #' @noRd
 new_model_policy <- function(model, arguments, labels = NULL, call = rlang::caller_env()) {
   method <- predict_method(model)
@@ -133,8 +133,8 @@ new_model_policy <- function(model, arguments, labels = NULL, call = rlang::call
 }
 
 #' Find the method of predict() for an object
-#' @return A list with the element `package`, the name of the package that must be loaded for the
-#'   method; `NULL` where there is no method.
+#' @return A list with the element `package`, the name of the package to load for the method; `NULL`
+#'   if there is no method.
 #' @noRd
 predict_method <- function(x) {
   if (!is.object(x)) {
@@ -167,7 +167,7 @@ abort_no_model <- function(x, call) {
 format.gym_policy_model <- function(x, ...) {
   formula <- tryCatch(stats::formula(x$model), error = function(cnd) NULL)
   if (inherits(formula, "formula")) {
-    # Without the environment, which would be printed, too.
+    # Drop the environment, which would be printed, too.
     attributes(formula) <- NULL
     text <- describe_value(formula)
   } else {
@@ -194,7 +194,7 @@ policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()
   policy
 }
 
-# A policy that was read from a file does not bring the package along.
+# A policy that was read from a file does not load the package.
 load_model_package <- function(policy, call) {
   package <- policy$package
   if (!is.null(package) && !isNamespaceLoaded(package)) {
@@ -245,9 +245,9 @@ check_was_played <- function(policy, call) {
   }
 }
 
-#' Ask a model about observations
+#' Get a model's predictions for observations
 #' @param columns A named list, the columns of a table of observations.
-#' @return What its predict() gives, a data frame of one column as a vector.
+#' @return The result of predict(), with a data frame of one column as a vector.
 #' @noRd
 model_predictions <- function(policy, columns, call) {
   load_model_package(policy, call)
@@ -288,7 +288,7 @@ model_actions <- function(policy, columns, call) {
   if (discrete) actions else shape_values(as.vector(t(actions)), c(n, space$shape))
 }
 
-# Whether there is an action for each observation, of as many numbers as it has.
+# Checks that there is an action for each observation, with the right number of numbers.
 check_predictions <- function(policy, predicted, n, width, call) {
   discrete <- inherits(policy$action_space, "gym_space_discrete")
   right <- if (discrete) is.atomic(predicted) else is.numeric(predicted)
@@ -311,7 +311,7 @@ check_predictions <- function(policy, predicted, n, width, call) {
   }
 }
 
-# Several columns of nnet() are outputs to be compared.
+# Several columns of nnet() are outputs to compare.
 largest_output <- function(policy, outputs, call) {
   space <- policy$action_space
   if (anyNA(outputs)) {
@@ -321,7 +321,7 @@ largest_output <- function(policy, outputs, call) {
   labels[max.col(outputs, ties.method = "first")]
 }
 
-# Discrete actions from labels, or the nearest ones; NA for what stands for none.
+# Discrete actions from labels or the nearest numbers; NA for a label without an action.
 chosen_actions <- function(policy, values) {
   space <- policy$action_space
   if (!is.null(policy$labels) && is.numeric(values)) {
@@ -330,14 +330,14 @@ chosen_actions <- function(policy, values) {
   if (!is.character(values)) {
     return(nearest_actions(space, as.numeric(values)))
   }
-  # The actions' numbers, or what the documentation calls them.
+  # The actions' numbers, or their names in the documentation.
   numbers <- as.integer(space$start + seq_len(space$n) - 1L)
   found <- match(values, as.character(numbers))
   found <- ifelse(is.na(found), match(values, action_meaning(policy$env_id, space$n)), found)
   numbers[found]
 }
 
-# NA for a whole number that is no action.
+# NA for a whole number that is not an action.
 nearest_actions <- function(space, numbers) {
   last <- space$start + space$n - 1
   whole <- numbers == trunc(numbers)

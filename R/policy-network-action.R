@@ -22,13 +22,13 @@ discrete_action <- function(space, outputs, policy) {
     integer(nrow(outputs))
   }
   if (identical(policy$output, "epsilon-greedy")) {
-    # As the greedy ones are found: a single output chooses between two.
+    # As for greedy actions: a single output chooses between two.
     chosen <- explore(chosen, policy$epsilon, space$n %||% max(ncol(outputs), 2L))
   }
   if (is.null(space)) chosen else chosen + as.integer(space$start)
 }
 
-# Draws any of `n` actions, from 0, in the place of some.
+# Replaces some actions by any of `n` actions, from 0.
 explore <- function(chosen, epsilon, n) {
   explores <- stats::runif(length(chosen)) < epsilon
   chosen[explores] <- sample.int(n, sum(explores), replace = TRUE) - 1L
@@ -56,12 +56,12 @@ box_action <- function(space, outputs, policy, one) {
   high <- rep(space$high, each = rows)
   values <- if (has_range(policy)) {
     share <- unit_outputs(outputs, output_activation(policy))
-    # The sum of two products, because high - low may be beyond the largest number.
+    # A sum of two products, because high - low may exceed the largest number.
     low * (1 - share) + high * share
   } else {
     outputs
   }
-  # Rounding must not move a value past a bound, which the environment would refuse.
+  # Rounding must not move a value past a bound: the environment would refuse it.
   values <- pmin(pmax(values, low), high)
   if (space$dtype %in% integer_dtypes) {
     values <- round(values)
@@ -71,18 +71,18 @@ box_action <- function(space, outputs, policy, one) {
 
 is_gaussian <- function(policy) identical(policy$output, "gaussian")
 
-# Whether each action has a log-probability. An output that is the environment's own will have one.
+# Whether each action has a log-probability. An output chosen by the environment will have one.
 has_log_prob <- function(policy) policy$output %in% c("softmax", "gaussian")
 
 draws_by_probability <- function(policy) is.na(policy$output) || has_log_prob(policy)
 
-# The policy that takes the most likely action, or that of the largest value.
+# The policy that takes the most likely action, or the one with the largest value.
 greedy_policy <- function(policy) {
   if (!inherits(policy, "gym_policy_network")) {
     return(policy)
   }
   if (is_gaussian(policy) && is.null(policy$action_space)) {
-    # It knows of no bounds, but that its actions are numbers.
+    # Its bounds are unknown; only its actions are known to be numbers.
     outputs <- policy$sizes[[length(policy$sizes)]]
     policy$action_space <- space_box(rep(-Inf, outputs), rep(Inf, outputs))
   }
@@ -90,8 +90,8 @@ greedy_policy <- function(policy) {
   policy
 }
 
-# What is drawn without bounds is cut at those of the action space when it is stepped. A list of
-# policies may have one that draws so; what other policies of ours return is within the bounds.
+# Numbers drawn without bounds are cut at those of the action space in the step. A list of policies
+# may contain one that draws so; actions of this package's other policies are within the bounds.
 clips_actions <- function(policy) UseMethod("clips_actions")
 
 #' @exportS3Method
@@ -117,5 +117,5 @@ clip_actions <- function(space, action) {
 
 output_activation <- function(policy) policy$activation[[length(policy$activation)]]
 
-# Have the outputs a range, from which they can be stretched to the bounds of an action?
+# Do the outputs have a range that can be stretched to the bounds of an action?
 has_range <- function(policy) output_activation(policy) %in% c("tanh", "logistic", "Gompertz")

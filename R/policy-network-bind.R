@@ -1,4 +1,4 @@
-# Fitting a network to an environment: it needs as many inputs as an observation has numbers, and as
+# Binding a network to an environment: it needs as many inputs as an observation has numbers, and as
 # many outputs as there are actions or numbers of an action.
 
 #' @exportS3Method
@@ -28,7 +28,7 @@ one_sub_env <- function(env) {
   )
 }
 
-# Fills in the sizes that are the environment's own, and the weights.
+# Fills in the sizes that depend on the environment, and the weights.
 with_sizes_of <- function(policy, env) {
   if (!anyNA(policy$sizes)) {
     return(policy)
@@ -146,7 +146,7 @@ abort_fit <- function(policy, problem, env, call) {
   )
 }
 
-# The sizes that would fit, with the hidden layers left as they are.
+# The sizes that would fit, with the same hidden layers.
 fitting_sizes <- function(policy, env) {
   inputs <- space_width(env$observation_space)
   outputs <- outputs_for(env$action_space, policy$output)
@@ -158,15 +158,15 @@ fitting_sizes <- function(policy, env) {
   paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
 }
 
-# How many outputs a network gets for actions of this space: a single one chooses between two, but
-# where each action has a probability or a value of its own.
+# The number of outputs for actions of this space: a single one chooses between two, unless each
+# action has its own probability or value.
 outputs_for <- function(space, output = "greedy") {
   width <- space_width(space)
   if (output == "greedy" && inherits(space, "gym_space_discrete") && width == 2) 1L else width
 }
 
-# How many inputs a network needs for an observation of this space, or outputs for an action of it.
-# NULL for a space that a network cannot observe or choose from.
+# The number of inputs for an observation of this space, or of outputs for its actions. NULL for a
+# space that a network does not support.
 space_width <- function(space) {
   if (inherits(space, "gym_space_discrete")) {
     space$n

@@ -1,96 +1,88 @@
-#' Decide by a small neural network
+#' Act by a small neural network
 #'
-#' Makes a network and draws its weights, uniformly between -1 and 1, from R's generator. Each layer
-#' multiplies what comes in by its weights and applies its activation.
+#' Make a network and draw its weights, uniformly between -1 and 1, from R's generator. Each layer
+#' multiplies its input by its weights and applies its activation.
 #'
 #' # From outputs to an action
 #'
-#' What the outputs mean depends on the environment's action space, which the
-#' policy learns from [rollout()] and [search_random()] (before that it takes
-#' itself to be in an environment with the actions 0, 1, ...):
+#' The meaning of the outputs depends on the environment's action space. The policy gets it from
+#' [rollout()] or [search_random()]; before that it assumes the actions 0, 1, ...
 #'
-#' - One output and two actions: the output, scaled to the range from 0 to 1, is
-#'   rounded, as in the tutorial *Artificial Intelligence in R (I)* (2018). Exactly one
-#'   half gives the first action, as [round()] gives 0.
-#' - As many outputs as actions: the action with the largest output, of equal ones
-#'   the first. Where the actions do not start at 0, the first output is the first
-#'   action all the same.
-#' - A Box with as many numbers as there are outputs: each output is stretched
-#'   from its own range to the bounds of its number, so that `"tanh"` at -1 gives
-#'   the lower bound, at 0 the middle and at 1 the upper bound. (Whole numbers, where
-#'   the Box has such, are rounded.) A Box with an unbounded side has no such scale
-#'   and is refused.
+#' - One output and two actions: the output, scaled to the range from 0 to 1, is rounded, as in the
+#'   tutorial *Artificial Intelligence in R (I)* (2018). Exactly one half selects the first action,
+#'   as [round()] returns 0.
+#' - As many outputs as actions: the action with the largest output, or the first of equal ones. The
+#'   first output always belongs to the first action, even if its number is not 0.
+#' - A Box with as many numbers as there are outputs: each output is stretched from its own range to
+#'   the bounds of its number. `"tanh"` at -1 gives the lower bound, at 0 the middle and at 1 the
+#'   upper bound. (Numbers of an integer Box are rounded.) A Box with an unbounded side has no such
+#'   scale and is refused.
 #'
-#' The range of `"logistic"` and `"Gompertz"` goes from 0 to 1, that of `"tanh"`
-#' from -1 to 1. `"identity"`, `"ReLU"` and `"leakyReLU"` have none. Then a single output gives the
-#' second of two actions where it is above 0, and the outputs are the numbers of a Box, cut at its
-#' bounds where it has some.
+#' The range of `"logistic"` and `"Gompertz"` is from 0 to 1, that of `"tanh"` from -1 to 1.
+#' `"identity"`, `"ReLU"` and `"leakyReLU"` are unbounded. For these, a single output selects the
+#' second of two actions if it is above 0, and the outputs are the numbers of a Box, cut at its
+#' bounds.
 #'
-#' Such a policy is greedy: the same observation gives the same action. Others draw, and their
-#' outputs are those of `"identity"`:
+#' Such a policy is greedy: the same observation gives the same action. Other policies draw their
+#' actions. Their last activation is `"identity"`:
 #'
-#' - `output = "softmax"` draws an action of a Discrete space with a probability that is
-#'   proportional to `exp(output)`. There is an output for each action.
+#' - `output = "softmax"` draws an action of a Discrete space with a probability proportional to
+#'   `exp(output)`. There is an output for each action.
 #' - `output = "gaussian"` draws the numbers of a Box, each from a normal distribution around its
-#'   output. The standard deviations do not depend on what is observed; their logarithms, `log_std`,
-#'   are weights, the last ones of [coef()][coef.gym_policy_network]. What is drawn is cut at the
-#'   bounds of the Box when the step is taken, but kept as it was drawn, in the steps of a
-#'   [rollout()] too: that is the action whose probability [policy_log_prob()] gives.
+#'   output. The standard deviations do not depend on the observation. Their logarithms, `log_std`,
+#'   are weights, the last ones of [coef()][coef.gym_policy_network]. The step cuts the numbers at
+#'   the bounds of the Box, but the steps of a [rollout()] keep them as drawn: [policy_log_prob()]
+#'   is about these.
 #' - `output = "epsilon-greedy"` draws any action with the probability `epsilon`, and otherwise
-#'   takes that with the largest output.
+#'   takes the one with the largest output.
 #'
 #' # Observations
 #'
-#' A Box gives as many inputs as it has numbers (of an array: row by row, as
-#' Gymnasium flattens it). A discrete observation, the field of a board for
-#' instance, gives one input for each of its values: 1 for the one observed, 0 for
-#' the others.
+#' A Box has as many inputs as numbers (an array row by row, as Gymnasium flattens it). A Discrete
+#' observation, such as the field of a board, has one input for each of its values: 1 for the
+#' observed one, 0 for the others.
 #'
-#' With `normalize = TRUE` each number of a Box comes in less its mean and divided by its standard
-#' deviation, so that numbers of different size weigh alike. These moments are those of the
-#' observations that the policy was trained on. They belong to it: a search updates them, playing
-#' and evaluating leave them as they are, and before the first update observations come in as they
-#' are.
-#' A number that has not changed so far comes in as 0.
+#' With `normalize = TRUE` the mean of each number of a Box is subtracted and the result divided by
+#' its standard deviation, so that numbers of different size have the same influence. These moments
+#' are those of the observations in training and belong to the policy. A search updates them;
+#' playing and evaluating do not. Before the first update, observations are used as they are. A
+#' number that has never changed becomes 0.
 #'
-#' @param sizes How many inputs, neurons in each hidden layer, and outputs there
-#'   are: whole numbers, at least two of them. The default, `c(4, 2, 1)`, is the
-#'   network of the tutorial: 4 x 2 + 2 x 1 = 10 weights. The first and the last may be `NA`: then
-#'   they are the environment's own, with a single output where there are two actions; weights that
-#'   are not given are then drawn when it is first played, from a number that is drawn now.
-#' @param activation The activations' names: one of the hidden layers and one of
-#'   the outputs (the default, `c("tanh", "logistic")`, as in the tutorial), or one for
-#'   each layer after the inputs: `"tanh"`, `"logistic"`, `"identity"` (what comes in goes out),
-#'   `"Gompertz"`, `"ReLU"` or `"leakyReLU"`. Where the output is not `"greedy"` the default is
-#'   `c("tanh", "identity")`.
-#' @param weights The weights: a list of matrices, one for each layer after the
-#'   inputs, with one row for each neuron of the layer and one column for each of
-#'   the layer before; with `bias = TRUE` one column more, the last, for the bias. `NULL`, the
-#'   default, draws them.
-#' @param bias Is a number added to what each neuron sums up, its bias? `FALSE`, the default, or
+#' @param sizes The numbers of inputs, of neurons in each hidden layer, and of outputs: whole
+#'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial: 4 x
+#'   2 + 2 x 1 = 10 weights. The first and the last may be `NA`. The environment then determines
+#'   them, with a single output for two actions. Weights that are not given are then drawn when it
+#'   is first played, from a seed that is drawn now.
+#' @param activation The names of the activations: one for the hidden layers and one for the outputs
+#'   (the default, `c("tanh", "logistic")`, as in the tutorial), or one for each layer after the
+#'   inputs: `"tanh"`, `"logistic"`, `"identity"` (no change), `"Gompertz"`, `"ReLU"` or
+#'   `"leakyReLU"`. If the output is not `"greedy"` the default is `c("tanh", "identity")`.
+#' @param weights The weights: a list of matrices, one for each layer after the inputs, with one row
+#'   for each neuron of the layer and one column for each of the previous layer. With `bias = TRUE`
+#'   the last column is the bias. `NULL`, the default, draws them.
+#' @param bias Does each neuron have a bias, a number added to its sum? `FALSE`, the default, or
 #'   `TRUE`.
-#' @param normalize Are observations normalised? `FALSE`, the default, or `TRUE`, see below.
-#' @param output How an action is made of the outputs, a string: `"greedy"`, the default,
-#'   `"softmax"`, `"gaussian"` or `"epsilon-greedy"`, see below. `NA` stands for the environment's
-#'   own: softmax for a Discrete action space, gaussian for a Box.
-#' @param log_std The natural logarithm of the standard deviations that `"gaussian"` begins with, a
-#'   number, or one for each output; the default is 0, a standard deviation of 1.
-#' @param epsilon How often `"epsilon-greedy"` draws any action, a number from 0 to 1; the default
-#'   is 0.1.
-#' @param init How the first weights are drawn, a string: `"uniform"`, the default, between -1 and
-#'   1; or `"orthogonal"`, in layers whose rows (or columns, where these are fewer) stand at right
-#'   angles and have the length sqrt(2), of the outputs 1, and 0.01 where actions are drawn by their
-#'   probability; biases are 0 then (Saxe, McClelland and Ganguli 2014; Andrychowicz et al. 2021).
-#' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and
-#'   [search_random()]; a list with the elements `sizes` (integers), `activation`
-#'   (strings, one for each layer), `weights` (a list of matrices), `bias` (a logical), `moments`
-#'   (`NULL`, or a list of `count`, `mean`, `squares` and `scale`, of the observations), `output`
-#'   and `init` (strings), `log_std` (numbers, which only `"gaussian"` uses), `epsilon` (a number),
-#'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
-#'   string), all `NULL` until it is played.
-#' @section Errors: `gym_error_argument` when sizes, activations and weights do not
-#'   fit each other; from [act()] when the observation
-#'   does not have as many numbers as there are inputs.
+#' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`, see below.
+#' @param output How the outputs determine an action, a string: `"greedy"`, the default,
+#'   `"softmax"`, `"gaussian"` or `"epsilon-greedy"`, see below. `NA` depends on the environment:
+#'   softmax for a Discrete action space, gaussian for a Box.
+#' @param log_std The natural logarithm of the first standard deviations of `"gaussian"`, a number,
+#'   or one for each output. The default is 0, a standard deviation of 1.
+#' @param epsilon The probability of a random action with `"epsilon-greedy"`, a number from 0 to 1.
+#'   The default is 0.1.
+#' @param init How to draw the first weights, a string. `"uniform"`, the default, draws them between
+#'   -1 and 1. `"orthogonal"` makes layers whose rows (or columns, if these are fewer) are
+#'   orthogonal. Their length is sqrt(2), and for the outputs 1, or 0.01 if actions are drawn by
+#'   their probability. Biases are 0 (Saxe, McClelland and Ganguli 2014; Andrychowicz et al. 2021).
+#' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and [search_random()].
+#'   It is a list with the elements `sizes` (integers), `activation` (strings, one for each layer),
+#'   `weights` (a list of matrices), `bias` (a logical), `moments` (`NULL`, or a list of `count`,
+#'   `mean`, `squares` and `scale`, of the observations), `output` and `init` (strings), `log_std`
+#'   (numbers, which only `"gaussian"` uses), `epsilon` (a number), `observation_space`,
+#'   `action_space` (spaces) and `env_id` (the id of the environment, a string), all three `NULL`
+#'   until it is played.
+#' @section Errors: `gym_error_argument` if sizes, activations and weights do not fit each other,
+#'   or, from [act()], if the observation does not have as many numbers as there are inputs.
 #' @references The network and the way its weights are drawn are those of the tutorial,
 #'   whose code computes the activations with the package sigmoid.
 #'
@@ -99,8 +91,8 @@
 #'
 #'   M. Andrychowicz et al. (2021), What matters for on-policy deep actor-critic methods? A
 #'   large-scale study, ICLR.
-#' @seealso [plot()][plot.gym_policy_network()] draws a network, [decision_map()] what it
-#'   does; [policy_random()].
+#' @seealso [plot()][plot.gym_policy_network()] draws a network, [decision_map()] shows its actions;
+#'   [policy_random()].
 #' @export
 #' @examples
 #' set.seed(1)
@@ -208,7 +200,7 @@ with_deviations <- function(policy, call = rlang::caller_env()) {
   policy
 }
 
-# The first and the last may be `NA`: then they are the environment's own.
+# The first and the last may be `NA`: the environment then determines them.
 check_sizes <- function(sizes, call = rlang::caller_env()) {
   if (is.logical(sizes) && all(is.na(sizes))) {
     sizes <- as.integer(sizes)
@@ -244,8 +236,8 @@ act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
 
-# The numbers of an observation with several dimensions are taken in the order in which R has them,
-# column after column, and the weights of the inputs are put into this order once.
+# Takes the numbers of an observation with several dimensions in R's order, column after column, and
+# reorders the input weights once to match.
 #' @exportS3Method
 policy_rows.gym_policy_network <- function(policy, candidate, sub_env) {
   shape <- policy$observation_space$shape
@@ -281,7 +273,7 @@ network_outputs <- function(policy, values, call = rlang::caller_env()) {
   signal
 }
 
-# What a layer takes: beside what comes in, with a bias, the constant 1.
+# The input of a layer: with a bias, the constant 1 is added.
 with_bias <- function(signal, policy) if (isTRUE(policy$bias)) cbind(signal, 1) else signal
 
 abort_observation <- function(policy, values, call) {
@@ -317,7 +309,7 @@ network_inputs <- function(space, values, call = rlang::caller_env()) {
 #' @exportS3Method
 policy_resample.gym_policy_network <- function(policy, call = rlang::caller_env()) {
   if (anyNA(policy$sizes)) {
-    # What is drawn when the sizes are known follows from this number.
+    # The weights depend on this number and are drawn when the sizes are known.
     policy$weights_seed <- draw_seed()
   } else {
     policy$weights <- draw_first_weights(policy)

@@ -3,9 +3,9 @@
 #' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
 #'   a data frame, such as the steps of a [rollout()], with a column for each number of an
 #'   observation under its name there.
-#' @param type `"action"`, the default, for the policy's actions, of one that draws the most likely
-#'   ones; `"output"` for the outputs of the network, or the predictions of the model, that they
-#'   follow from; or `"probability"` for how likely each action is, of a network with the output
+#' @param type `"action"`, the default, returns the policy's actions, or the most likely ones if it
+#'   draws them. `"output"` returns the outputs of the network, or the predictions of the model.
+#'   `"probability"` returns the probability of each action, for a network with the output
 #'   `"softmax"` or `"epsilon-greedy"`, or a table.
 #' @export
 predict.gym_policy <- function(object, newdata, type = c("action", "output", "probability"), ...) {
@@ -41,7 +41,7 @@ predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlan
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
 }
 
-# How likely each action is, a row for each row of outputs.
+# The probability of each action, a row for each row of outputs.
 output_probabilities <- function(policy, outputs, call) {
   if (identical(policy$output, "softmax")) {
     return(softmax_rows(outputs))
@@ -65,8 +65,8 @@ abort_no_probabilities <- function(policy, call) {
   )
 }
 
-# The observations in a data frame: the columns with their names, or all columns where it has none
-# of these names.
+# The observations in a data frame: the columns with their names, or all columns if it has none of
+# these names.
 observations_from <- function(newdata, policy, call) {
   if (!is.data.frame(newdata)) {
     return(newdata)

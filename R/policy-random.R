@@ -1,22 +1,18 @@
 #' Act at random
 #'
-#' `policy_random()` makes a policy that looks at nothing and draws its action:
-#' uniformly between the bounds of the action space, and from an exponential or
-#' normal distribution where a side or both are unbounded, as Gymnasium's own
-#' `sample()` does. In a model, see [gym_model()], it draws among the actions that the
-#' state has. It draws from R's generator, so that [set.seed()] fixes it.
-#' `random_discrete_agent()` is the same for `n` actions, under the name that the
-#' classic package had for it.
+#' `policy_random()` makes a policy that ignores the observation and draws its action: uniformly
+#' between the bounds of the action space, and from an exponential or normal distribution if one
+#' side or both are unbounded, like Gymnasium's own `sample()`. In a model, see [gym_model()], it
+#' draws among the actions that the state has. It uses R's generator, so [set.seed()] fixes its
+#' actions. `random_discrete_agent()` does the same for `n` actions; it has the name from the
+#' classic package.
 #'
-#' @param action_space The actions to draw from, a space such as
-#'   `gym_make("CartPole-v1")$action_space`. `NULL`, the default, is the action
-#'   space of the environment that the policy is played in.
-#' @param n How many actions there are, a whole number of at least 1. The actions
-#'   are 0, 1, ..., `n` - 1.
+#' @param action_space The space to draw from, such as `gym_make("CartPole-v1")$action_space`.
+#'   `NULL`, the default, is the action space of the environment that the policy plays.
+#' @param n The number of actions, a whole number of at least 1. The actions are 0, 1, ..., `n` - 1.
 #' @return A policy of class `gym_policy_random`, for [act()] and [rollout()].
-#' @section Errors: `gym_error_argument` when `action_space` is no space or `n` not
-#'   a whole number of at least 1; from [act()] when the policy has no action space
-#'   yet.
+#' @section Errors: `gym_error_argument` if `action_space` is not a space or `n` is not a whole
+#'   number of at least 1; from [act()] if the policy has no action space yet.
 #' @seealso [policy_network()]
 #' @export
 #' @examples
@@ -62,9 +58,9 @@ act.gym_policy_random <- function(policy, observation, ...) {
   if (is.null(n)) space_sample(space) else sample_batch(space, n)
 }
 
-# An observation matters to it only in that each one needs an action. How many there are is known
-# only where they are numbers or the rows of a data frame; observations that are lists, of an
-# environment with several parts, are given one at a time. `NULL` stands for a single one.
+# The number of observations, each of which gets an action. It is known only for numbers and for
+# rows of a data frame. Lists, of an environment with several parts, are given one at a time. `NULL`
+# is a single observation.
 count_observed <- function(observation, space) {
   if (!is.null(space) && !is_stackable(space) || is.list(observation)) {
     return(if (is.data.frame(observation)) nrow(observation))
@@ -89,7 +85,7 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy$observation_space <- env$observation_space
   if (is.null(own)) {
     policy$action_space <- env$action_space
-    # In an end, which has no actions, nothing is done.
+    # A terminal state has no actions; the policy does nothing there.
     count <- if (!is.null(env$possible)) rowSums(env$possible)
     policy$possible <- if (any(count > 0 & count < ncol(env$possible))) env$possible
   } else if (!space_within(own, env$action_space)) {
@@ -107,7 +103,7 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy
 }
 
-# Whether each value of one space is a value of the other, judged by their kinds and shapes.
+# Whether each value of one space is a value of the other, by their kinds and shapes.
 space_within <- function(inner, outer) {
   if (inherits(inner, "gym_space_discrete") && inherits(outer, "gym_space_discrete")) {
     inner$start >= outer$start && inner$start + inner$n <= outer$start + outer$n

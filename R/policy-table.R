@@ -1,26 +1,26 @@
 #' Act by a table
 #'
-#' Makes a policy of a table with a row for each observation (a state) and a column for each action:
-#' in each state it takes the action with the largest value there, the first of several. With
-#' `epsilon` it explores: with this probability it draws any action instead, each equally likely
-#' (Sutton and Barto 2018, section 2.2). With `temperature` it draws each action with a probability
-#' that is proportional to `exp(value / temperature)` (softmax, or Boltzmann, exploration).
+#' Make a policy from a table with a row for each observation (a state) and a column for each
+#' action. In each state it takes the action with the largest value, or the first of equal ones.
+#' With `epsilon` it explores: with this probability it draws an action uniformly (Sutton and Barto
+#' 2018, section 2.2). With `temperature` it draws each action with a probability proportional to
+#' `exp(value / temperature)` (softmax, or Boltzmann, exploration).
 #'
 #' Observations are Discrete, MultiDiscrete, MultiBinary, or a Tuple or Dict of these. The rows are
-#' in the order of a Discrete's numbers; of several numbers the last one changes first.
+#' in the order of a Discrete space's numbers. With several numbers the last one changes first.
 #'
 #' @param q A numeric matrix with a row for each state and a column for each action: values, or
-#'   anything else of which larger is better. `-Inf` for an action that cannot be taken; a row in
-#'   which none can is an error when it is asked for.
-#' @param epsilon How often it explores, a number from 0, the default, to 1.
-#' @param temperature The temperature of the softmax, a number above 0; `NULL`, the default, for
+#'   other numbers of which larger is better. `-Inf` marks an invalid action. A row without a valid
+#'   action is an error if the policy gets there.
+#' @param epsilon The probability of exploring, a number from 0, the default, to 1.
+#' @param temperature The temperature of the softmax, a number above 0. `NULL`, the default, for
 #'   none.
 #' @return A policy of class `gym_policy_table`, for [act()], [rollout()] and [evaluate_policy()].
-#' @section Errors: `gym_error_argument` for a table that is no such matrix, or that does not have
-#'   the rows and columns that the environment it is played in needs.
+#' @section Errors: `gym_error_argument` for an invalid table, or one without the rows and columns
+#'   that the environment needs.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
-#' @seealso [solve_mdp()], which finds the best one where the model is known
+#' @seealso [solve_mdp()], which finds the best policy if the model is known
 #' @export
 #' @examples
 #' # Two states, three actions.
@@ -59,7 +59,7 @@ predict_policy.gym_policy_table <- function(policy, newdata, type, call = rlang:
   if (type == "probability") row_probabilities(policy, rows) else rows
 }
 
-# What a table has rows for.
+# The observation space of a table's rows.
 states_of <- function(policy) policy$observation_space %||% space_discrete(nrow(policy$q))
 
 #' @exportS3Method
@@ -84,7 +84,7 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   rows
 }
 
-# The numbers, from 1, of the actions that are taken.
+# The numbers of the chosen actions, from 1.
 draw_table_actions <- function(policy, rows) {
   if (!is.null(policy$temperature)) {
     return(draw_by_row(row_probabilities(policy, rows)))
@@ -100,15 +100,15 @@ draw_table_actions <- function(policy, rows) {
   choice
 }
 
-# How likely a table takes each action in each state. A state without an action is an end, where
-# none is taken: its row may have any.
+# The probability of each action in each state. A state without actions is terminal and its row does
+# not matter.
 table_probabilities <- function(policy) {
   q <- policy$q
   q[row_max(q) == -Inf, ] <- 0
   row_probabilities(policy, q)
 }
 
-# How likely each action is, a row for each state.
+# The probability of each action, a row for each state.
 row_probabilities <- function(policy, rows) {
   if (!is.null(policy$temperature)) {
     return(softmax_rows(rows, policy$temperature))
@@ -139,8 +139,8 @@ draw_by_row <- function(p) {
   pmin(choice, last)
 }
 
-# The largest number in each row, and its column, the first of several. A single row is asked about
-# in each step of an episode.
+# The largest number in each row and its column, the first of several. An episode asks about a
+# single row in each step.
 row_max <- function(x) {
   if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
 }

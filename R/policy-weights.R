@@ -1,13 +1,13 @@
 # The weights of a network: a matrix for each layer after the inputs, with a row for each neuron and
-# a column for each of what it takes; with a bias there is one column more, the last.
+# a column for each of its inputs. The bias is an additional last column.
 
 # The shapes of the matrices.
 weight_shapes <- function(sizes, bias) {
   Map(c, sizes[-1L], sizes[-length(sizes)] + isTRUE(bias))
 }
 
-# The weights are drawn in the order of the tutorial: first the matrix of the hidden layer, then
-# the weights of the output.
+# Draws the weights in the order of the tutorial: first the matrix of the hidden layer, then the
+# weights of the output.
 draw_weights <- function(sizes, bias = FALSE, init = "uniform", last_gain = 1) {
   shapes <- weight_shapes(sizes, bias)
   if (init == "orthogonal") {
@@ -19,8 +19,8 @@ draw_weights <- function(sizes, bias = FALSE, init = "uniform", last_gain = 1) {
   })
 }
 
-# Saxe, McClelland and Ganguli (2014): rows, or columns where these are fewer, of length `gain` that
-# stand at right angles; biases are 0.
+# Saxe, McClelland and Ganguli (2014): orthogonal rows, or columns if these are fewer, of length
+# `gain`; biases are 0.
 draw_orthogonal <- function(shape, gain, bias) {
   neurons <- shape[[1L]]
   inputs <- shape[[2L]] - isTRUE(bias)
@@ -31,7 +31,7 @@ draw_orthogonal <- function(shape, gain, bias) {
   cbind(gain * if (neurons >= inputs) basis else t(basis), if (isTRUE(bias)) numeric(neurons))
 }
 
-# Where actions are drawn the first ones are nearly as likely as each other.
+# If actions are drawn, all of them are nearly equally likely at first.
 draw_first_weights <- function(policy) {
   last_gain <- if (draws_by_probability(policy)) 0.01 else 1
   draw_weights(policy$sizes, policy$bias, policy$init, last_gain)
@@ -41,8 +41,8 @@ zero_weights <- function(sizes, bias) {
   lapply(weight_shapes(sizes, bias), function(shape) matrix(0, shape[[1L]], shape[[2L]]))
 }
 
-# The weights may have been changed by hand. A network whose sizes are its environment's has none
-# before it is bound to one.
+# The user may have changed the weights. A network whose sizes depend on the environment has no
+# weights before it is bound.
 check_network <- function(policy, call = rlang::caller_env()) {
   if (is.null(policy$weights)) {
     gym_abort(
@@ -88,8 +88,8 @@ check_layer <- function(layer, wanted, bias, arg, call) {
   }
 }
 
-# The weights as one vector, layer after layer, each matrix column after column; at last the
-# logarithms of standard deviations, where the policy has such.
+# The weights as one vector, layer after layer, each matrix column after column, and then the
+# logarithms of standard deviations, if the policy has any.
 weight_vector <- function(policy) {
   c(unlist(lapply(policy$weights, as.vector)), if (is_gaussian(policy)) policy$log_std)
 }
@@ -105,5 +105,5 @@ count_weights <- function(policy) {
   sum(lengths(policy$weights)) + if (is_gaussian(policy)) length(policy$log_std) else 0L
 }
 
-# "4-2-1", and "*" for a size that is the environment's own.
+# "4-2-1", with "*" for a size that depends on the environment.
 sizes_text <- function(sizes) paste(ifelse(is.na(sizes), "*", sizes), collapse = "-")

@@ -1,60 +1,55 @@
 #' Choose an action
 #'
-#' Asks a policy what to do, given what is observed: one observation in, one
-#' action out; many observations in, as many actions out. Changes nothing, except
-#' that a [random policy][policy_random()] draws from R's generator.
+#' Return a policy's action for an observation: one action for one observation, many actions for
+#' many observations. Nothing changes, except that a [random policy][policy_random()] draws from R's
+#' generator.
 #'
-#' A policy is an object made by [policy_random()] or [policy_network()], or any
-#' function that takes many observations, one in each row of a matrix, and returns as
-#' many actions. A method of `act()` for a class of your own makes policies of another
-#' kind, which [rollout()] then plays; it asks them about many observations at once, too.
+#' A policy is an object made by [policy_random()] or [policy_network()], or any function that takes
+#' many observations, one in each row of a matrix, and returns as many actions. To make another kind
+#' of policy, write a method of `act()` for your own class; [rollout()] can then play it. It calls
+#' the method with many observations at once.
 #'
 #' # Functions as policies
 #'
-#' A function is always asked about many observations, be they one. For the usual
-#' environments they are the rows of a matrix, where observations are arrays themselves
-#' an array with one dimension more, the first, where they are single whole numbers an
-#' integer vector, and where they have several parts (Tuple and Dict) a list with the
-#' same for each part. How many there are changes from call to call: while [rollout()] plays
-#' many episodes at once, those that have ended are no longer asked about. What it returns has
-#' the same form: a vector with an action for
-#' each observation (a logical one counts as 0 and 1), a matrix with an action in each
-#' row, an array, or a list of these for the parts. [rollout()] asks it about a single one
-#' before the first step, so that a function which cannot answer that fails at once.
+#' A function always gets a batch of observations, even if there is only one. For the usual
+#' environments the batch is a matrix with an observation in each row. If observations are arrays,
+#' it is an array with an additional first dimension; if they are single whole numbers, an integer
+#' vector; if they have several parts (Tuple and Dict), a list with the same for each part. The
+#' number of observations varies: [rollout()] plays many episodes together and leaves out those that
+#' have ended. The result has the same form: a vector with an action for each observation (`TRUE`
+#' counts as 1), a matrix with an action in each row, an array, or a list of these for the parts.
+#' [rollout()] first calls the function with a single observation, so that errors show at once.
 #'
-#' A policy that draws, such as a [policy_network()] with the output `"softmax"`, draws from R's
-#' generator, too; `draw = FALSE` gives its most likely action instead.
+#' A policy that draws its actions, such as a [policy_network()] with the output `"softmax"`, also
+#' uses R's generator. `draw = FALSE` returns its most likely action instead.
 #'
-#' `predict()` gives the same actions (where the policy draws the most likely ones), or the outputs
-#' that they follow from, for observations in a data frame, too. It never touches R's generator.
+#' `predict()` returns the same actions (the most likely ones if the policy draws them), or the
+#' outputs behind them. It also accepts a data frame of observations. It never uses R's generator.
 #'
 #' # Saving policies
 #'
-#' [saveRDS()] keeps a policy, and [readRDS()] gives it back in any session. A function keeps the
-#' variables that it uses where these are not in the global environment; connections among them, and
-#' environments made by [gym_make()], are lost.
+#' [saveRDS()] saves a policy, and [readRDS()] restores it in any session. A function keeps the
+#' variables that it uses if they are not in the global environment. Connections, and environments
+#' made by [gym_make()], are lost.
 #'
-#' @param policy The policy: of class `gym_policy`, or a function of many
-#'   observations.
-#' @param observation What is observed. For the usual environments a numeric
-#'   vector is one observation, and a numeric matrix, or a data frame, has one observation in
-#'   each row. Where observations are arrays themselves, many of them have one
-#'   dimension more, the first; where they are single whole numbers, many of them
-#'   are an integer vector. A function knows of no space: to it a vector is always
-#'   passed as a matrix of one row.
-#' @param draw Does a network that draws its actions draw? `TRUE`, the default, or `FALSE` for the
-#'   most likely action, or that of the largest value.
+#' @param policy The policy: of class `gym_policy`, or a function of many observations.
+#' @param observation The observation. For the usual environments a numeric vector is one
+#'   observation, and a numeric matrix or a data frame has one in each row. If observations are
+#'   arrays, many of them have an additional first dimension. If they are single whole numbers, many
+#'   of them are an integer vector. A function has no observation space: it gets a vector as a
+#'   matrix of one row.
+#' @param draw For a network that draws its actions: draw? `TRUE`, the default, or `FALSE` for the
+#'   most likely action, or the one with the largest value.
 #' @param ... For methods.
-#' @return For one observation one action: a whole number for a discrete action
-#'   space, a numeric vector (or array) in the shape of the space for a Box. For
-#'   `n` observations an integer vector of length `n`, or a matrix with `n` rows
-#'   (an array with `n` as its first dimension). `predict()` returns the same, and with
-#'   `type = "output"` a numeric vector of length `n` (a matrix with `n` rows where the network has
-#'   several outputs), with `type = "probability"` a matrix with a row for each observation and a
-#'   column for each action.
-#' @section Errors: `gym_error_argument` when `policy` is no policy, the observation
-#'   does not have as many numbers as the policy takes, or a function does not return one
-#'   action for one observation; from `predict()` also when the policy is no network.
+#' @return For one observation one action: a whole number for a discrete action space, a numeric
+#'   vector (or array) in the shape of the space for a Box. For `n` observations an integer vector
+#'   of length `n`, or a matrix with `n` rows (an array with `n` as its first dimension).
+#'   `predict()` returns the same; with `type = "output"` a numeric vector of length `n` (a matrix
+#'   with `n` rows if the network has several outputs), and with `type = "probability"` a matrix
+#'   with a row for each observation and a column for each action.
+#' @section Errors: `gym_error_argument` if `policy` is not a policy, the observation does not have
+#'   as many numbers as the policy needs, or a function does not return one action for one
+#'   observation. From `predict()` also if the policy is not a network.
 #' @export
 #' @examples
 #' policy <- policy_network(sizes = c(4, 2, 1))
@@ -101,7 +96,7 @@ act.function <- function(policy, observation, ...) {
 
 is_one_vector <- function(observation) is.atomic(observation) && is.null(dim(observation))
 
-# Observations as functions get them: a vector is one, in a matrix of one row.
+# Observations in the form for functions: a vector is one, in a matrix of one row.
 function_rows <- function(observation) {
   if (is.data.frame(observation)) {
     as.matrix(observation)
@@ -153,7 +148,7 @@ check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   policy_list(x)
 }
 
-# A training plays as the policy that it found, trainings as the policies of their seeds.
+# A training plays as its policy, trainings as the policies of their seeds.
 trained_policy <- function(x) {
   if (inherits(x, c("gym_training", "gym_rollout"))) {
     x$policy
@@ -164,7 +159,7 @@ trained_policy <- function(x) {
   }
 }
 
-# Candidates are several policies, so they are none of a list.
+# Candidates are several policies, so they cannot be an element of a list.
 check_one_policy <- function(x, arg, call) {
   if (!is.null(count_candidates(x))) {
     gym_abort(
@@ -207,23 +202,22 @@ policy_text <- function(policy) {
   if (inherits(policy, "gym_policy")) format(policy) else describe_argument(policy)
 }
 
-# The same up to the first detail: "random" or "network 4-2-1".
+# The text up to the first detail: "random" or "network 4-2-1".
 policy_label <- function(policy) sub("(,| over).*", "", policy_text(policy))
 
-# What rollouts and searches ask of a policy ------------------------------------
+# What rollouts and searches need from a policy ---------------------------------
 
-#' Fit a policy to an environment
+#' Bind a policy to an environment
 #'
-#' [rollout()], [train_agent()] and every search do this first: a policy learns what observations
-#' and actions there are, and a network whose sizes are the environment's own gets these, and its
-#' weights. A package that brings a policy of its own may write a method; without one a policy stays
-#' as it is.
+#' [rollout()], [train_agent()] and every search do this first. The policy gets the observation and
+#' action spaces. A network whose sizes depend on the environment gets these and its weights. Write
+#' a method if a package has its own policy class; without one a policy stays as it is.
 #'
 #' @param policy The policy.
-#' @param env The environment, as [gym_make()] makes it or [as_vector_env()] returns it.
-#' @param call Where an error says that it comes from, as in [rlang::abort()].
-#' @return The policy, fitted.
-#' @section Errors: `gym_error_argument` when the policy cannot play there.
+#' @param env The environment, as returned by [gym_make()] or [as_vector_env()].
+#' @param call The call to name in errors, as in [rlang::abort()].
+#' @return The bound policy.
+#' @section Errors: `gym_error_argument` if the policy cannot play there.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1")
@@ -257,8 +251,8 @@ policy_resample.default <- function(policy, call = rlang::caller_env()) {
 #'
 #' @param policy A policy that is bound to the environment.
 #' @param observation A batch of observations.
-#' @param n How many observations there are.
-#' @param vector_env As [as_vector_env()] returns it.
+#' @param n The number of observations.
+#' @param vector_env As returned by [as_vector_env()].
 #' @return A batch of actions, one for each observation.
 #' @noRd
 act_batch <- function(policy, observation, n, vector_env) UseMethod("act_batch")
@@ -274,15 +268,15 @@ act_batch.default <- function(policy, observation, n, vector_env) {
 
 #' Put one or many observations into the rows of a matrix
 #'
-#' @param space The observation space, `NULL` for a policy that knows none and
-#'   takes a vector for one observation and a matrix for many.
+#' @param space The observation space. `NULL` for a policy without one, which takes a vector for one
+#'   observation and a matrix for many.
 #' @return A list: `values`, a matrix with an observation in each row, its numbers in row-major
-#'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation
-#'   rather than a batch.
+#'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation and
+#'   not a batch.
 #' @noRd
 observation_rows <- function(observation, space, call = rlang::caller_env()) {
   observation <- narrow_values(observation, function(x) plain_numbers(x, "observation", call))
-  # How many dimensions an observation has: none in a discrete space, which has no shape.
+  # The number of dimensions of an observation: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
   check_rows(observation, rank, space, call)
   axes <- dim(observation)
@@ -314,10 +308,10 @@ check_rows <- function(observation, rank, space, call) {
 
 #' Put one or many observations into a batch
 #'
-#' @param space The observation space. Where it has parts there is one observation, or a data frame
-#'   with a column for each part.
-#' @return A list: `batch`; `n`, how many observations there are; `one`, whether `observation` was a
-#'   single observation rather than a batch.
+#' @param space The observation space. If it has parts, `observation` is one observation, or a data
+#'   frame with a column for each part.
+#' @return A list: `batch`; `n`, the number of observations; `one`, whether `observation` was a
+#'   single observation and not a batch.
 #' @noRd
 observed_batch <- function(observation, space, call = rlang::caller_env()) {
   if (is_stackable(space)) {

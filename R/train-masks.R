@@ -1,10 +1,11 @@
-# Masks: which actions can be taken, as an environment's infos say.
+# Masks: which actions are valid, according to an environment's infos.
 
-#' Let a vector environment tell a learner which actions can be taken
+#' Let a vector environment tell a learner which actions are valid
 #'
-#' Its `reset()` and `step()` ask for infos, which [as_vector_env()] otherwise leaves out.
+#' Its `reset()` and `step()` request infos, which [as_vector_env()] otherwise leaves out.
 #' @param name The name of the info's element that is the mask.
-#' @param note A function of a batch of observations and their masks, a logical matrix with a row
+#' @param note A function of a batch of observations and their masks (a logical matrix with a row
+#'   for each observation and a column for each action), which is called whenever masks arrive.
 #'   for each observation and a column for each action, which is called whenever some are known.
 #' @noRd
 with_masks <- function(vector_env, name, note, call) {
@@ -20,7 +21,7 @@ with_masks <- function(vector_env, name, note, call) {
   }
   masked <- if (is.null(env$num_envs)) masked_single_env else masked_sub_envs
   vector_env[c("reset", "step")] <- masked(env, vector_env, name, note, call)
-  # The info of an episode that an environment begins by itself would take the place of its last.
+  # If the environment starts the next episode itself, its info would replace that of the last step.
   vector_env$begins_next <- FALSE
   vector_env$step_one <- NULL
   vector_env
@@ -83,9 +84,9 @@ masked_sub_envs <- function(env, vector_env, name, note, call) {
   )
 }
 
-#' The mask in an info
-#' @param n For how many sub-environments.
-#' @return A logical matrix, `NULL` where the info has no such element.
+#' Read the mask in an info
+#' @param n The number of sub-environments.
+#' @return A logical matrix, `NULL` if the info has no such element.
 #' @noRd
 mask_in <- function(info, name, n, actions, call) {
   mask <- plain_numbers(info[[name]], "mask", call)
@@ -119,10 +120,10 @@ needed_mask <- function(info, name, n, actions, call) {
   mask
 }
 
-#' Let a learner never again take the actions that a mask forbids
+#' Keep a learner from taking masked actions again
 #'
-#' Their values become -Inf, so that its policy does not take them either.
-#' @param mask As [with_masks()] notes it.
+#' Their values become -Inf, so its policy does not take them either.
+#' @param mask As passed to `note` of [with_masks()].
 #' @noRd
 forbid_actions <- function(learner, agent, observation, mask, call) {
   row <- agent$basis$of(observation, nrow(mask))[, 1L]

@@ -1,10 +1,10 @@
-# The memory of an agent: the steps that it learns from again and again. It is large and grows by a
-# little, so a checkpoint does not write it anew: what is new is appended to files beside it.
+# The memory of an agent: the steps that it learns from repeatedly. It is large and grows slowly, so
+# a checkpoint does not rewrite it: new steps are appended to files beside it.
 
 #' Make an empty memory
-#' @param size How many steps it has at most; the oldest are overwritten.
-#' @return A list of class `gym_memory`: `size`, `count`, how many steps there were in all, and
-#'   `steps`, a matrix with numbers of a step in each column.
+#' @param size The largest number of steps; the oldest are overwritten.
+#' @return A list of class `gym_memory`: `size`, `count`, the total number of steps so far, and
+#'   `steps`, a matrix with the numbers of a step in each column.
 #' @noRd
 new_memory <- function(size) {
   structure(list(size = size, count = 0, steps = NULL), class = "gym_memory")
@@ -15,7 +15,7 @@ new_memory <- function(size) {
 #' @noRd
 add_to_memory <- function(memory, new) {
   n <- ncol(new)
-  # Of more than there is room for, the last.
+  # If there are more than fit, only the last ones.
   kept <- seq.int(max(1, n - memory$size + 1), n)
   at <- memory_columns(memory, memory$count + kept)
   room <- max(0L, ncol(memory$steps))
@@ -29,15 +29,15 @@ add_to_memory <- function(memory, new) {
   memory
 }
 
-# Where the steps of some numbers, from 1, are.
+# The columns of the steps with these numbers, from 1.
 memory_columns <- function(memory, number) (number - 1) %% memory$size + 1
 
 # In files ---------------------------------------------------------------------------------------
 
-# A file has as many steps as the memory, the next ones are in the next file. So two files have all
-# that is remembered, and older ones are removed. Each process has files of its own, with its key in
-# their names, and the checkpoint has the key: so processes with one checkpoint leave each other's
-# files alone.
+# A file has as many steps as the memory; later ones go into the next file. So two files contain the
+# whole memory, and older ones are removed. Each process has its own files, with its key in their
+# names, and the checkpoint has the key: processes that share a checkpoint do not touch each other's
+# files.
 memory_file <- function(path, key, number) paste0(path, ".memory-", key, "-", number)
 
 memory_files <- function(path, key = "[0-9a-f]+") {
@@ -48,12 +48,12 @@ memory_files <- function(path, key = "[0-9a-f]+") {
 
 #' Prepare to keep a memory in files
 #' @param path The checkpoint.
-#' @param earlier The key of the checkpoint that training goes on from, `NULL` for none.
-#' @return A function of an agent, which appends what is new and returns the agent with a memory
-#'   without steps: what the checkpoint has of it.
+#' @param earlier The key of the checkpoint that training resumes from, `NULL` for none.
+#' @return A function of an agent, which appends new steps and returns the agent with an empty
+#'   memory, as the checkpoint keeps it.
 #' @noRd
 memory_writer <- function(path, earlier = NULL) {
-  # A process that still runs has written to its own not long ago.
+  # A process that still runs has written to its own files recently.
   files <- setdiff(memory_files(path), if (!is.null(earlier)) memory_files(path, earlier))
   unlink(files[difftime(Sys.time(), file.mtime(files), units = "mins") > 10])
   # A name that no other process has, drawn without R's generator.
@@ -68,11 +68,11 @@ memory_writer <- function(path, earlier = NULL) {
       unlink(memory_files(path, earlier))
       earlier <<- NULL
     }
-    # The file before those that are named stays, in case that a checkpoint could not be written.
+    # The file before these stays, in case a checkpoint could not be written.
     remove_forgotten(path, key, count - 2 * memory$size, memory$size)
     first <- max(0, memory$count - memory$size) %/% memory$size
     if (count == 0 || !file.exists(memory_file(path, key, (count - 1) %/% memory$size))) {
-      # All that is remembered is written, also where somebody has removed the files.
+      # Write the whole memory, even if somebody has removed the files.
       count <<- first * memory$size
     }
     while (count < memory$count) {
@@ -94,10 +94,10 @@ key_of_checkpoint <- function(path) {
   saved$training$agent$memory$key
 }
 
-# Steps that are forgotten already are needed no more: zeros keep their place.
+# Forgotten steps are not needed any more: zeros keep their place.
 append_memory <- function(memory, file, first, last) {
   numbers <- seq.int(first, last)
-  # What a full disk has left of an earlier attempt is cut off.
+  # Cut off what an earlier attempt on a full disk has left.
   before <- 8 * nrow(memory$steps) * ((first - 1) %% memory$size)
   if (file.exists(file) && file.size(file) != before) cut_file(file, before)
   values <- memory$steps[, memory_columns(memory, numbers), drop = FALSE]
@@ -105,7 +105,7 @@ append_memory <- function(memory, file, first, last) {
   write_bytes(file, writeBin(as.vector(values), raw(), endian = "little"), "ab")
 }
 
-# Removes files that have only steps up to a number.
+# Removes files that have only steps up to this number.
 remove_forgotten <- function(path, key, last, size) {
   files <- memory_files(path, key)
   numbers <- as.numeric(sub(".*-", "", files))
@@ -139,7 +139,7 @@ restore_memory <- function(agent, path, call = NULL) {
   agent
 }
 
-# Reads the first steps of a file. What follows them was written after the checkpoint.
+# Reads the first steps of a file. Later ones were written after the checkpoint.
 read_memory <- function(file, count, width, call) {
   bytes <- 8 * count * width
   if (!file.exists(file) || file.size(file) < bytes) {

@@ -1,7 +1,7 @@
 # The result of a training: class gym_training.
 
 #' Make the result of a training
-#' @param state As [new_state()] makes it: the iterations that were finished count.
+#' @param state As made by [new_state()]; only finished iterations count.
 #' @noRd
 training_result <- function(settings, state, interrupted = FALSE) {
   search <- settings$search
@@ -9,7 +9,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
   structure(
     c(
       list(
-        # A policy of which nothing was played is no finding of a search.
+        # A search has not found a policy that was never played.
         policy = if (!search || state$iteration > 0L) judged_policy(settings, state$agent),
         agent = state$agent,
         solved = state$solved,
@@ -34,7 +34,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
   )
 }
 
-# Rows, which are lists or data frames, as one data frame; `none` is that of no rows.
+# Combines rows, lists or data frames, into a data frame; `none` is the one without rows.
 rows_table <- function(rows, none) {
   if (!length(rows)) {
     return(none)
@@ -100,7 +100,7 @@ training_lines <- function(x) {
   )
 }
 
-# Was it calculated, without playing an episode?
+# Was it evaluated exactly, without playing an episode?
 is_exact <- function(row) isTRUE(row$episodes == 0)
 
 evaluation_text <- function(row) {
@@ -125,10 +125,10 @@ coef.gym_training <- function(object, ...) {
   stats::coef(object$policy)
 }
 
-# How many steps of the training had been taken at each evaluation.
+# The steps of the training before each evaluation.
 evaluation_steps <- function(x) c(0, x$history$steps)[x$evaluations$iteration + 1L]
 
-# Whose returns an iteration's row is about: an agent that learns from steps plays one policy.
+# What the row of an iteration describes: an agent that learns from steps plays one policy.
 returned_unit <- function(agent) {
   by_steps <- learns_online(agent) || "trajectories" %in% agent_needs(agent)
   if (by_steps) "episodes" else "candidates"

@@ -1,10 +1,10 @@
-# What makes a comparison of trainings unequal: other targets, budgets or rules of evaluation.
+# Differences that make a comparison of trainings unfair: targets, budgets or rules of evaluation.
 
-# What is kept of a training's arguments for that, beside the target.
+# The arguments that a training keeps for this, in addition to the target.
 kept_rules <- c("iterations", "total_steps", "max_steps", "eval_every", "eval_episodes",
                 "eval_episodes_curve", "evaluate")
 
-#' Name what differs between trainings in one environment
+#' Name the differences between trainings in one environment
 #' @param trainings A list of trainings, or of trainings with many seeds, with names.
 #' @return A string for each kind of difference, such as `"targets differ: A 475; B 490"`.
 #' @noRd
@@ -23,7 +23,7 @@ unequal_rules <- function(trainings) {
   }))
 }
 
-# `NULL` where these rules are the same everywhere.
+# `NULL` if all trainings have the same rules.
 unequal_text <- function(what, rules, names) {
   value <- function(of_one, name) {
     value <- of_one[[name]] %||% "none"

@@ -1,15 +1,14 @@
 #' Trainings with several seeds
 #'
 #' One training says little about an agent: another seed may fail. `train_agent(seeds = )` trains
-#' anew with each of many seeds and returns all of them, failures included.
+#' once with each of many seeds and returns all trainings, failures included.
 #'
-#' A training is `solved` where its stopping evaluation has reached the target. The time of that
-#' evaluation is one at which the policy was lucky, so that how often the target is reached is
-#' judged by the final evaluations, of episodes that no training has seen: `reached` says whether
-#' the final mean return has reached the target. The interval of that share is Wilson's, which makes
-#' sense also where all or none have.
+#' A training is `solved` if an evaluation during training reached the target. At that time the
+#' policy was also lucky. The final evaluations, of episodes that no training has seen, are
+#' therefore the better measure: `reached` says whether the final mean return has reached the
+#' target. The interval of this share is Wilson's, which also works if all or none have reached it.
 #'
-#' @param x,object Trainings, as `train_agent(seeds = )` returns them.
+#' @param x,object Trainings, as returned by `train_agent(seeds = )`.
 #' @param row.names,optional,... Not used.
 #' @return An object of class `gym_trainings`, a list with the elements
 #'   \describe{
@@ -17,21 +16,24 @@
 #'       seeds.}
 #'     \item{agent, env_id, target}{The agent as given, the environment's id, a string, and the
 #'       target, a number or `NULL`.}
-#'     \item{elapsed}{The seconds that all took, a double.}
-#'     \item{interrupted}{Whether it was interrupted, a logical. The last of the trainings may then
-#'       have ended early.}
-#'     \item{provenance}{What [provenance()] tells, with all seeds.}
-#'   } `as.data.frame()` gives a row for each seed: `seed` (whole number), `solved` (logical: has
-#'   the stopping evaluation reached the target?), `iterations` (integer), `steps` (double),
+#'     \item{elapsed}{The total time in seconds, a double.}
+#'     \item{interrupted}{Whether it was interrupted, a logical. The last training may then have
+#'       ended early.}
+#'     \item{provenance}{The result of [provenance()], with all seeds.}
+#'   }
+#'   `as.data.frame()` returns a row for each seed: `seed` (whole number), `solved` (logical: did an
+#'   evaluation during training reach the target?), `iterations` (integer), `steps` (double),
 #'   `mean_return`, `se`, `lower`, `upper` (of the final evaluation, doubles), `reached` (logical:
-#'   has that mean reached the target?), `elapsed` (seconds, a double), `interrupted` (logical).
+#'   has this mean return reached the target?), `elapsed` (seconds, a double), `interrupted`
+#'   (logical).
 #'
-#'   `coef()` gives the weights of the policies, a matrix with a row for each seed.
+#'   `coef()` returns the weights of the policies, a matrix with a row for each seed.
 #'
-#'   `summary()` gives an object of class `summary.gym_trainings`, a list of `trainings`,
-#'   `finished`, `solved` and `reached` (how many, integers), `lower` and `upper` (the 95% interval
-#'   of the share that reaches the target, doubles), `returns` and `steps` (quartiles and mean of
-#'   the final mean returns and of the steps of the training, named numeric vectors of length 6).
+#'   `summary()` returns an object of class `summary.gym_trainings`, a list of `trainings`,
+#'   `finished`, `solved` and `reached` (their numbers, integers), `lower` and `upper` (the 95%
+#'   interval of the share that reaches the target, doubles), `returns` and `steps` (quartiles and
+#'   mean of the final mean returns and of the steps of the training, named numeric vectors of
+#'   length 6).
 #' @references E. B. Wilson (1927), Probable inference, the law of succession, and statistical
 #'   inference, Journal of the American Statistical Association 22, 209-212.
 #' @seealso [train_agent()], [plot()][plot.gym_trainings()]
@@ -100,7 +102,7 @@ summary.gym_trainings <- function(object, ...) {
   )
 }
 
-#' The interval of a share, by Wilson's score
+#' Compute Wilson's score interval of a share
 #' @noRd
 wilson_interval <- function(successes, n, level = 0.95) {
   if (n == 0) {
@@ -110,7 +112,7 @@ wilson_interval <- function(successes, n, level = 0.95) {
   share <- successes / n
   middle <- (share + z^2 / (2 * n)) / (1 + z^2 / n)
   half <- z / (1 + z^2 / n) * sqrt(share * (1 - share) / n + z^2 / (4 * n^2))
-  # At 0 and 1 rounding leaves the bound a hair beside them.
+  # At 0 and 1 rounding would leave the bound slightly off.
   c(if (successes == 0) 0 else middle - half, if (successes == n) 1 else middle + half)
 }
 

@@ -13,10 +13,10 @@ check_training_seeds <- function(seeds, seed, call) {
 
 #' Train with each seed
 #'
-#' An interrupt ends all; so does an error, which carries the trainings so far. The training that it
-#' met is the last of them.
+#' An interrupt ends all trainings. So does an error, which carries the trainings so far; the last
+#' of them is the one that failed.
 #' @param in_env A function that makes the environment and calls a function with it. All trainings
-#'   play in the same, unless it remembers earlier episodes.
+#'   share one environment, unless it remembers earlier episodes.
 #' @param files As for [new_run()].
 #' @return As [gym_trainings].
 #' @noRd
@@ -64,7 +64,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   result(interrupted)
 }
 
-# Without a target no search is solved, whatever its seed.
+# Without a target, no seed solves a search.
 check_has_target <- function(settings, vector_env, call) {
   if (is.null(training_target(settings, vector_env$spec))) {
     gym_abort(
@@ -76,7 +76,7 @@ check_has_target <- function(settings, vector_env, call) {
   }
 }
 
-# An error carries the trainings so far, with the one that was being trained.
+# An error carries the trainings so far, including the current one.
 keeping_trainings <- function(code, trained, keep, result, what, files, call) {
   tryCatch(code, error = function(cnd) {
     in_training <- inherits(cnd, "gym_error_training")
@@ -99,7 +99,7 @@ keeping_trainings <- function(code, trained, keep, result, what, files, call) {
   })
 }
 
-# Messages come once, for all seeds.
+# Show each message once for all seeds.
 train_seed <- function(run, with_env, client, call) {
   withCallingHandlers(
     do_run(run, with_env, NULL, client, progress = FALSE, call),
@@ -127,8 +127,8 @@ seeds_go_to_workers <- function(vector_env, settings) {
   FALSE
 }
 
-# What remembers something over episodes does so on the worker as well, which plays a whole
-# training.
+# An environment that remembers something over episodes does so on the worker, too, which plays a
+# whole training.
 training_recipe <- function(vector_env, settings) {
   vector_env$remembers <- NULL
   sampled <- settings$sampled
@@ -137,7 +137,7 @@ training_recipe <- function(vector_env, settings) {
   )
 }
 
-# Where trainings side by side have workers of their own on this machine, too.
+# If parallel trainings have their own workers on this machine, too.
 inform_of_servers <- function() {
   plans <- future::plan("list")
   if (length(plans) < 2L || !inherits(plans[[1L]], c("multisession", "multicore"))) {
@@ -155,8 +155,8 @@ inform_of_servers <- function() {
   }
 }
 
-# How many workers a plan asks for, also one that is not in use: future would set that one up to
-# answer, which ends the workers of the one in use. `NA` where it cannot be told.
+# The number of workers of a plan, also of one that is not in use. future would start that plan to
+# answer, which ends the workers of the current one. `NA` if it is unknown.
 workers_of_plan <- function(plan) {
   if (inherits(plan, "sequential")) {
     return(1)
@@ -171,7 +171,7 @@ workers_of_plan <- function(plan) {
   as.numeric(if (is.null(workers)) NA else if (is.numeric(workers)) workers else length(workers))
 }
 
-# A future for each seed. What they return is kept in the order of the seeds.
+# A future for each seed. Results are kept in the order of the seeds.
 train_in_futures <- function(vector_env, runs, keep, call) {
   recipe <- training_recipe(vector_env, runs[[1L]]$settings)
   trained <- vector("list", length(runs))
@@ -201,7 +201,7 @@ train_in_futures <- function(vector_env, runs, keep, call) {
 #' @exportS3Method
 run_task.gym_task_training <- function(task) {
   settings <- task$run$settings
-  # The plan uses the cores.
+  # The plan already uses the cores.
   if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
   with_env <- function(use, max_steps) {
@@ -213,7 +213,7 @@ run_task.gym_task_training <- function(task) {
   train_seed(task$run, with_env, gym_client(), call)
 }
 
-# What a seed has of its own: its settings, its checkpoint, the folder of its log.
+# What differs between seeds: the settings, the checkpoint, the folder of the log.
 run_of_seed <- function(settings, seed, files, call) {
   settings$seed <- seed
   text <- format(seed, scientific = FALSE)

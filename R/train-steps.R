@@ -1,20 +1,19 @@
-# One step at a time: the loop in which a learner of ours plays a single sub-environment, which is a
-# model, an environment in R, or one of a server's; and the same learner in several of them.
+# One step at a time: the loop in which a learner of this package plays a single sub-environment (a
+# model, an environment in R, or one on a server); and the same learner in several of them.
 
 #' Make the functions by which a learner of values learns
 #'
-#' They are made once for a training, and change what they keep in place. What an observation is to
-#' the learner, `x`, is what `one()` of its basis returns; actions are numbered from 1.
+#' They are made once for a training and change their state in place. `x` is an observation as
+#' `one()` of the learner's basis returns it. Actions are numbered from 1.
 #' @return A list of functions: `begin(x, sub_env, observation)`, the first action of an episode;
 #'   `observe(x, column, reward, after, terminated, ended, sub_env, observation)`, which learns from
-#'   a step and returns the next action, `NA` at the end of the episode; `act(observation, n)`,
-#'   where a policy acts that must be asked about all sub-environments together, else `NULL`;
-#'   `whole`, of a learner that learns between episodes, a list of the functions `policy()`, with
-#'   which the next episodes can be played, and `learn(x, column, reward, episode)`, of all steps;
-#'   `sees`, whether both must get the observation, which else may be `NULL`; `export()`, the agent
-#'   as it is now; `forbid(x, forbidden)`, after which these actions are never
-#'   taken, and which returns the values; `renew()`, before an iteration, as [uniform_draws()] has
-#'   it, and `uniform()`, which draws.
+#'   a step and returns the next action, `NA` at the end of the episode; `act(observation, n)`, if
+#'   the policy must be asked about all sub-environments together, otherwise `NULL`; `whole`, for a
+#'   learner that learns between episodes, a list of the functions `policy()`, which can play the
+#'   next episodes, and `learn(x, column, reward, episode)`, for all their steps; `sees`, whether
+#'   both need the observation, which may otherwise be `NULL`; `export()`, the current agent;
+#'   `forbid(x, forbidden)`, which bars these actions for ever and returns the values; `renew()`,
+#'   called before an iteration, see [uniform_draws()], and `uniform()`, which draws.
 #' @noRd
 learner_of <- function(agent) UseMethod("learner_of")
 
@@ -22,8 +21,8 @@ learner_of <- function(agent) UseMethod("learner_of")
 learner_of.default <- function(agent) NULL
 
 #' Let a learner play the episodes of an iteration in a single sub-environment
-#' @param world As [world_of()] makes it.
-#' @param limit After how many steps an episode is cut off.
+#' @param world As made by [world_of()].
+#' @param limit The number of steps after which an episode is cut off.
 #' @return A list: `returns` and `lengths` of the episodes.
 #' @noRd
 play_steps <- function(learner, world, seeds, limit, report, call) {
@@ -60,14 +59,14 @@ play_steps <- function(learner, world, seeds, limit, report, call) {
 
 # Worlds ------------------------------------------------------------------------------
 
-#' See a single sub-environment as a learner does
+#' Make a learner's view of a single sub-environment
 #'
-#' @param basis That of the learner, see [basis_of()].
+#' @param basis The learner's, see [basis_of()].
 #' @param draw Draws a number from 0 to 1.
 #' @return A list of functions: `reset(seed)`, which returns a list of `x` and the observation, a
 #'   batch of one; and `step(x, column)`, which returns a list of the next `x`, the reward, whether
-#'   the episode was terminated, whether it was truncated, and the observation. `guard` is a
-#'   function of code that steps, or `NULL`.
+#'   the episode terminated, whether it was truncated, and the observation. `guard` is a function of
+#'   code that steps, or `NULL`.
 #' @noRd
 world_of <- function(vector_env, basis, draw) {
   if (!is.null(vector_env$model)) {
@@ -77,7 +76,7 @@ world_of <- function(vector_env, basis, draw) {
   }
 }
 
-# Any that is reset and stepped by functions.
+# Any environment with functions for reset and step.
 stepped_world <- function(vector_env, basis) {
   first <- as.integer(vector_env$action_space$start) - 1L
   reset <- vector_env$reset
@@ -97,7 +96,7 @@ stepped_world <- function(vector_env, basis) {
   )
 }
 
-# A model is played in its own numbers of states. Its limit of steps is the loop's.
+# A model plays with its own state numbers. The loop applies its step limit.
 model_world <- function(model, basis, draw) {
   moves <- moves_of(model)
   states <- moves$states
@@ -143,7 +142,7 @@ model_world <- function(model, basis, draw) {
 # Several sub-environments --------------------------------------------------------------
 
 #' Let a learner play several sub-environments, one after the other in each step
-#' @return A list of `act` and `observe`, as [play_batch()] takes it.
+#' @return A list of `act` and `observe`, for [play_batch()].
 #' @noRd
 side_by_side <- function(learner, agent, call) {
   basis <- agent$basis
@@ -185,7 +184,7 @@ side_by_side <- function(learner, agent, call) {
           pick(present, i), column[[i]], reward[[i]], pick(after, i), terminated[[i]], ended[[i]],
           sub_env[[i]], seen
         )
-        # Of a policy that acts for all 0 says that the episode goes on.
+        # If the policy acts for all together, 0 says that the episode goes on.
         next_column[[sub_env[[i]]]] <<- if (ended[[i]]) {
           NA_integer_
         } else if (is.na(following)) {
