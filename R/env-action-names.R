@@ -1,5 +1,5 @@
-# What the actions of an environment mean, from the sections "Action Space" in Gymnasium's
-# documentation of each environment (https://gymnasium.farama.org/environments/).
+# The meanings of actions, from the sections "Action Space" in Gymnasium's documentation of each
+# environment (https://gymnasium.farama.org/environments/).
 
 action_meanings <- list(
   Acrobot = c("torque -1", "no torque", "torque +1"),
@@ -17,10 +17,9 @@ action_meanings <- list(
   Taxi = c("south", "north", "east", "west", "pick up", "drop off")
 )
 
-#' Find out what the actions of an environment mean
-#' @param n How many actions there are, or numbers of an action; `NULL` where that is unknown.
-#' @return Strings, `NULL` where the environment is unknown or a wrapper has changed what there is
-#'   to do.
+#' Find the meanings of an environment's actions
+#' @param n The number of actions, or of numbers of an action; `NULL` if it is unknown.
+#' @return Strings; `NULL` if the environment is unknown or a wrapper has changed the actions.
 #' @noRd
 action_meaning <- function(env_id, n = NULL) {
   meaning <- action_meanings[[environment_family(env_id), exact = TRUE]]
@@ -31,9 +30,9 @@ action_meaning <- function(env_id, n = NULL) {
 environment_family <- function(env_id) sub("-v[0-9]+$", "", env_id %||% "")
 
 #' Name the actions of an environment
-#' @param n How many actions there are; of a Box, how many numbers an action has.
+#' @param n The number of actions; for a Box, the number of numbers of an action.
 #' @param start The first of them.
-#' @return Strings such as `"0: push left"`, or the numbers alone where nothing is known.
+#' @return Strings such as `"0: push left"`, or only the numbers if the meanings are unknown.
 #' @noRd
 action_names <- function(env_id, n, start = 0L) {
   number <- as.character(start + seq_len(n) - 1L)
@@ -47,8 +46,8 @@ action_parts <- function(env_id, n) {
   action_meaning(env_id, n) %||% if (n == 1L) "action" else paste0("action_", seq_len(n))
 }
 
-#' Turn actions that are given by what they mean into their numbers
-#' @return The actions; what is no text, as it is.
+#' Convert actions given by their meaning to numbers
+#' @return The actions; values other than text are unchanged.
 #' @noRd
 numbered_actions <- function(instance, action, call) {
   space <- instance$single_action_space

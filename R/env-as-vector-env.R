@@ -1,76 +1,74 @@
-#' See an environment as a vector environment to play in
+#' Convert an environment to a vector environment to play in
 #'
-#' Whatever is played is played through this: [rollout()] and every search call it, and ask nothing
-#' else of an environment. A method for a class of your own makes environments of another kind
-#' that all of them can play.
+#' All functions that play use this interface: [rollout()] and every search call it, and use nothing
+#' else of an environment. Write a method for your own class to let all of them play another kind of
+#' environment.
 #'
-#' An environment that is named by its id is made, and closed by `$close()`. It gets 256
-#' sub-environments; where an observation is large fewer, so that those of all together take no
-#' more than a mebibyte, but at least 16; and none where a wrapper remembers something over episodes
-#' (`NormalizeObservation`, `NormalizeReward`). A server that cannot make so many makes a quarter of
-#' them, 16, or a single environment. Where Gymnasium has a vector implementation that plays the
-#' same game it is taken; elsewhere each sub-environment has a seed of its own, and the server
-#' divides them among processes where that pays. One that was made before is played as it is, and
-#' left open.
+#' An environment given by its id is made, and closed by `$close()`. It gets 256 sub-environments.
+#' It gets fewer if observations are large, so that all together take at most a mebibyte, but at
+#' least 16. It gets none if a wrapper remembers something over episodes (`NormalizeObservation`,
+#' `NormalizeReward`). If the server cannot make that many, it makes a quarter of them, 16, or a
+#' single environment. Gymnasium's vector implementation is used if it plays the same game.
+#' Otherwise each sub-environment has its own seed, and the server divides them among processes if
+#' that is faster. An environment that was made before is used as it is, and stays open.
 #'
-#' @param x The environment: an id such as `"CartPole-v1"`, perhaps with wrappers (see
-#'   [gym_wrap()]), an environment made by [gym_make()] or [gym_env()], or any list or environment
-#'   with functions `reset(seed)` and `step(action)` and the elements `observation_space`,
-#'   `action_space` and `spec`.
-#' @param num_envs How many sub-environments to make, a whole number of at least 1. `NULL`, the
-#'   default, chooses; an environment that was made before has the number that it has.
-#' @param num_workers How many processes run the sub-environments, a whole number: 0 for none but
-#'   the server itself. `NULL`, the default, lets the server choose, and takes none for fewer than
-#'   32 episodes (`max_envs`). What is played does not depend on it. Only where the environment is
-#'   named by its id and has no vector implementation of its own.
-#' @param ... The environment's own arguments, by name, where it is named by its id.
-#' @param max_envs No more sub-environments than this are made where `num_envs` is `NULL` and each
-#'   has a seed of its own, a number; by default there is no limit.
-#' @param frames Are frames wanted? `FALSE`, the default, or `TRUE`: then there is one
-#'   sub-environment.
-#' @param client The client of the server where an environment named by its id is made; the default
-#'   is the session's own, [gym_client()].
+#' @param x The environment: an id such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]), an
+#'   environment made by [gym_make()] or [gym_env()], or any list or environment with functions
+#'   `reset(seed)` and `step(action)` and the elements `observation_space`, `action_space` and
+#'   `spec`.
+#' @param num_envs The number of sub-environments to make, a whole number of at least 1. `NULL`, the
+#'   default, chooses. An environment that was made before keeps its number.
+#' @param num_workers The number of processes that run the sub-environments, a whole number: 0 for
+#'   none but the server itself. `NULL`, the default, lets the server choose, and uses none for
+#'   fewer than 32 episodes (`max_envs`). The result does not depend on it. Only if the environment
+#'   is given by its id and has no vector implementation of its own.
+#' @param ... Arguments of the environment, by name, if it is given by its id.
+#' @param max_envs The largest number of sub-environments if `num_envs` is `NULL` and each has its
+#'   own seed, a number. By default there is no limit.
+#' @param frames Keep frames? `FALSE`, the default, or `TRUE`, which uses one sub-environment.
+#' @param client The client of the server that makes an environment given by its id. The default is
+#'   the session's client, [gym_client()].
 #' @return An object of class `gym_vector_env`, a list with the elements
 #'   \describe{
 #'     \item{observation_space, action_space}{Those of one sub-environment.}
 #'     \item{spec}{A list of `id` (a string), `reward_threshold`, `max_episode_steps` and
 #'       `render_fps` (numbers or `NULL`).}
-#'     \item{num_envs}{How many sub-environments there are, an integer.}
-#'     \item{batch_size}{How many episodes make a batch, an integer.}
-#'     \item{one_seed}{`TRUE` where one random generator serves all sub-environments, which are
-#'       then reset together; `FALSE` where each has a seed of its own.}
-#'     \item{begins_next}{`TRUE` where a sub-environment that has ended begins its next episode by
-#'       itself, in the same step, as long as it has seeds. `FALSE` or `NULL` where it must be
-#'       reset.}
-#'     \item{endless}{`TRUE` where it is known that no episode ever ends, so that it is played with
-#'       `max_steps` only. `FALSE` or `NULL` elsewhere.}
-#'     \item{possible}{Where a model is played, a logical matrix of the actions that can be taken,
-#'       with a row for each state and a column for each action; else `NULL`.}
+#'     \item{num_envs}{The number of sub-environments, an integer.}
+#'     \item{batch_size}{The number of episodes in a batch, an integer.}
+#'     \item{one_seed}{`TRUE` if all sub-environments share one random generator; they are then
+#'       reset together. `FALSE` if each has its own seed.}
+#'     \item{begins_next}{`TRUE` if a sub-environment starts its next episode itself in the step
+#'       that ends an episode, as long as it has seeds. `FALSE` or `NULL` if it must be reset.}
+#'     \item{endless}{`TRUE` if it is known that no episode ever ends; it can then be played with
+#'       `max_steps` only. Otherwise `FALSE` or `NULL`.}
+#'     \item{possible}{For a model, a logical matrix of the valid actions, with a row for each state
+#'       and a column for each action; otherwise `NULL`.}
 #'     \item{reset(seeds, which)}{A function that starts episodes and returns the first
-#'       observations, a row for each: with `one_seed` in all sub-environments, `seeds` being one
-#'       whole number; otherwise in the sub-environments with the numbers `which`, in increasing
-#'       order, with a seed for each. With `begins_next` `seeds` may also be a list with a vector of
-#'       seeds for each: the first for now, the others for the episodes that it begins by itself.}
+#'       observations, a row for each. With `one_seed`, it resets all sub-environments and `seeds`
+#'       is one whole number. Otherwise it resets the sub-environments with the numbers `which`, in
+#'       increasing order, with a seed for each. With `begins_next`, `seeds` may also be a list with
+#'       a vector of seeds for each: the first for now, the others for the episodes that it starts
+#'       itself.}
 #'     \item{step(action, which)}{A function that steps the sub-environments with the numbers
-#'       `which`; `action` has a row for each of these, and so has what it returns, a list of
-#'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, which is what
-#'       the step led to. `observation` is the same, but where another episode began in this step:
-#'       there it is the first one of that episode.}
-#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, where that is
-#'       quicker; otherwise `NULL`.}
+#'       `which`. `action` has a row for each of these, and so has the result, a list of
+#'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, the observation
+#'       after the step. `observation` is the same, unless the step also started another episode: it
+#'       is then the first observation of that episode.}
+#'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, if that is faster;
+#'       otherwise `NULL`.}
 #'     \item{frame()}{A function that returns the current frame as the bytes of a PNG file; `NULL`
-#'       where no frames are wanted.}
-#'     \item{remembers}{The names of wrappers that remember something over episodes, strings; then
-#'       the episodes are never split over batches.}
+#'       without `frames`.}
+#'     \item{remembers}{The names of wrappers that remember something over episodes, strings. All
+#'       episodes are then in one batch.}
 #'     \item{env}{The environment that it plays, with the functions `reset()` and `step()` of
-#'       [gym_make()], which return infos; `NULL` where there is no such one, as with several
-#'       sub-environments in R.}
-#'     \item{client}{The client of the server, `NULL` where there is none.}
+#'       [gym_make()], which return infos; `NULL` if there is none, as for several sub-environments
+#'       in R.}
+#'     \item{client}{The client of the server, or `NULL`.}
 #'     \item{close(wait)}{A function that closes what was made here, and nothing else; with
 #'       `wait = FALSE` without waiting for the server.}
 #'   }
-#' @section Errors: `gym_error_argument` for something that is no environment; those of
-#'   [gym_make()] where one is made.
+#' @section Errors: `gym_error_argument` for an object that is not an environment. As for
+#'   [gym_make()] if an environment is made.
 #' @seealso [rollout()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -113,7 +111,7 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   env <- made$env
   vector_env <- vector_env_of(env, frames, made$batch_size)
   vector_env$close <- function(wait = TRUE) {
-    # A server that hangs must not be waited for again.
+    # Do not wait again for a server that hangs.
     if (wait) close_or_warn(env) else close_unused(env$client, env$instance_id)
   }
   vector_env
@@ -130,7 +128,7 @@ as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frame
   vector_env_of(x, frames)
 }
 
-# Frames are kept of one sub-environment, which plays one episode after the other.
+# Frames are kept with one sub-environment, which plays one episode after the other.
 check_one_framed <- function(num_envs, frames, call = rlang::caller_env()) {
   if (frames && isTRUE(num_envs > 1)) {
     gym_abort(
@@ -153,7 +151,7 @@ check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env
   }
 }
 
-# What was played is not lost because the environment could not be closed.
+# A failure to close must not lose the results.
 close_or_warn <- function(env) {
   tryCatch(
     env$close(),
@@ -168,10 +166,10 @@ close_or_warn <- function(env) {
 
 # Seeing one as a vector environment ---------------------------------------------------
 
-#' Describe an environment that was made as a vector environment
+#' Convert an environment that was made before to a vector environment
 #'
-#' @param batch_size How many episodes make a batch where each sub-environment has a seed of its
-#'   own; `NULL` for what follows from how many sub-environments there are.
+#' @param batch_size The number of episodes in a batch if each sub-environment has its own seed;
+#'   `NULL` to derive it from the number of sub-environments.
 #' @return As [as_vector_env()].
 #' @noRd
 vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::caller_env()) {
@@ -202,9 +200,9 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
   structure(vector_env, class = "gym_vector_env")
 }
 
-# How many episodes make a batch in sub-environments with seeds of their own: with four of them
-# each, few sub-environments have nothing to play while the last episodes end. Where there is only
-# one, what is interrupted loses no episode that has ended.
+# The number of episodes in a batch for sub-environments with their own seeds. With four episodes
+# each, few sub-environments are idle while the last episodes end. With a single one, an interrupt
+# loses no finished episode.
 episodes_of_batch <- function(num_envs) {
   as.integer(if (num_envs == 1L) 1L else 4L * num_envs)
 }
@@ -225,13 +223,13 @@ single_env <- function(env) {
   )
 }
 
-# With "sync" and "async" each sub-environment is an environment of its own: it has a seed of its
-# own, and only those that are playing are stepped. Only a server's environments have `num_workers`;
-# what else has sub-environments need not know how to begin an episode by itself.
+# With "sync" and "async" each sub-environment is an environment with its own seed, and only those
+# that play are stepped. Only a server's environments have `num_workers`; others need not be able to
+# start an episode themselves.
 independent_sub_envs <- function(env) {
   n <- env$num_envs
   space <- env$single_observation_space
-  # The first time all are reset, because the others have no episode yet.
+  # The first reset is for all, because none has an episode yet.
   was_reset <- FALSE
   reset <- function(seeds, which) {
     some <- was_reset && length(which) < n
@@ -268,10 +266,9 @@ bare_stepper <- function(env) {
   }
 }
 
-# Makes a function that decides which sub-environments are stepped for those that play. Others that
-# were stepped before are stepped along, whose results nobody uses: a request for other
-# sub-environments is another request, which has to be prepared. When fewer than half of them still
-# play, the others are left out.
+# Makes a function that decides which sub-environments are stepped. Those that were stepped before
+# are stepped along, and their results ignored: another set needs a new request, which takes time to
+# prepare. When fewer than half of them still play, the others are left out.
 step_chooser <- function(env) {
   n <- env$num_envs
   actions <- env$single_action_space
@@ -291,9 +288,9 @@ step_chooser <- function(env) {
   }
 }
 
-# Some rows of what a step returned.
+# Some rows of the result of a step.
 rows_of_step <- function(space, out, row) {
-  # The two are nearly always the same, which identical() sees at once.
+  # The two are nearly always the same object, which identical() detects at once.
   same <- identical(out$observation, out$next_observation)
   observation <- batch_rows(space, out$observation, row)
   list(
@@ -303,8 +300,8 @@ rows_of_step <- function(space, out, row) {
   )
 }
 
-# With "vector_entry_point" one generator serves all sub-environments, so there is one seed for all.
-# All are always stepped, also those whose episode has ended; what these return is left out.
+# With "vector_entry_point" all sub-environments share one generator and one seed. All are always
+# stepped, including those whose episode has ended; their results are ignored.
 joint_sub_envs <- function(env) {
   n <- env$num_envs
   observed <- env$single_observation_space
@@ -327,7 +324,8 @@ joint_sub_envs <- function(env) {
   )
 }
 
-# The actions of all sub-environments: those that have ended repeat that of the first that plays.
+# The actions of all sub-environments: those that have ended repeat the action of the first that
+# plays.
 actions_of_all <- function(space, action, which, n) {
   if (length(which) == n) {
     return(action)

@@ -1,21 +1,21 @@
 #' Make a bandit
 #'
-#' A bandit has arms, each of which pays a reward drawn from a normal distribution of its own
-#' (Sutton and Barto 2018, chapter 2). Nothing is observed but that: the observation is always 0,
-#' and an action is the number of an arm, from 0. In each episode the arms' means are drawn anew,
-#' unless they are given, which makes the testbed of section 2.3.
+#' A bandit has arms, each of which pays a reward from its own normal distribution (Sutton and Barto
+#' 2018, chapter 2). The observation is always 0, and an action is the number of an arm, from 0.
+#' Each episode draws new means of the arms, unless you give them. This is the testbed of section
+#' 2.3.
 #'
-#' @param arms How many arms there are, a whole number of at least 1; the default is 10, or how many
-#'   means are given.
-#' @param mean The mean reward of each arm, a numeric vector with an element for each; `NULL`, the
-#'   default, draws them from the standard normal distribution, moved by `centre`.
+#' @param arms The number of arms, a whole number of at least 1. The default is 10, or the number of
+#'   means given.
+#' @param mean The mean reward of each arm, a numeric vector. `NULL`, the default, draws them from
+#'   the normal distribution with mean `centre` and standard deviation 1.
 #' @param sd The standard deviation of rewards around the mean, a number of at least 0.
-#' @param centre The mean of the means that are drawn, a number; the default is 0.
-#' @param drift The standard deviation of the step by which each mean moves after each action, a
-#'   number of at least 0; the default, 0, leaves them where they are.
-#' @param horizon How many actions make an episode, a whole number; the default is 1,000.
-#' @return An environment, as [gym_env()] makes them, in which [rollout()] plays 256
-#'   sub-environments side by side, each with arms of its own. [learn_bandit()] learns in it.
+#' @param centre The mean of the distribution of means, a number. The default is 0.
+#' @param drift The standard deviation of the random step of each mean after each action, a number
+#'   of at least 0. The default, 0, keeps the means constant.
+#' @param horizon The number of actions in an episode, a whole number. The default is 1,000.
+#' @return An environment, as made by [gym_env()]. [rollout()] plays 256 sub-environments of it,
+#'   each with its own arms. [learn_bandit()] learns in it.
 #' @section Errors: `gym_error_argument`.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
@@ -78,7 +78,7 @@ pull <- function(bandit, means, arm) {
   list(reward = reward, means = means)
 }
 
-# What a bandit's environment was made of, `NULL` for any other environment.
+# The settings of a bandit's environment, `NULL` for any other environment.
 bandit_of <- function(env) {
   bandit <- definition_of(env)$parameters[["bandit"]]
   if (inherits(bandit, "gym_bandit")) bandit

@@ -1,6 +1,6 @@
-# What check_env() looks at. Each look notes what it finds in `check`, an environment with `env`,
-# `found` (a list of findings), `misfits` (how many observations did not fit their space), `lengths`
-# (of the episodes played) and `limit` (the steps that an episode may take).
+# The checks of check_env(). Each records its findings in `check`, an environment with `env`,
+# `found` (a list of findings), `misfits` (the number of observations that did not fit their space),
+# `lengths` (of the episodes played) and `limit` (the most steps of an episode).
 
 look_at_environment <- function(check, seed) {
   if (!look_at_members(check)) {
@@ -30,18 +30,17 @@ look_at_environment <- function(check, seed) {
   look_at_copies(check, first, seed)
 }
 
-#' Look whether an environment that has a model plays as that says
+#' Check whether an environment plays like its model
 #'
 #' @param env The environment itself.
-#' @param seed Episodes are played with seeds above it.
+#' @param seed Episodes use seeds above it.
 #' @noRd
 look_at_model <- function(env, check, seed) UseMethod("look_at_model")
 
 #' @exportS3Method
 look_at_model.default <- function(env, check, seed) NULL
 
-# The generators of two episodes with different seeds can only come to the same state when somebody
-# sets it.
+# The generators of two episodes with different seeds only have the same state if somebody sets it.
 look_at_draws <- function(check, states, others) {
   set <- Filter(
     function(topic) !is.null(states[[topic]]) && identical(states[[topic]], others[[topic]]),
@@ -55,7 +54,7 @@ look_at_draws <- function(check, states, others) {
   }
 }
 
-# The same kind of finding is noted once, where it is first found.
+# The same kind of finding is recorded once, at its first occurrence.
 note_finding <- function(check, topic, finding, key = finding, severity = "wrong") {
   key <- paste(topic, key)
   if (is.null(check$found[[key]])) {
@@ -63,8 +62,8 @@ note_finding <- function(check, topic, finding, key = finding, severity = "wrong
   }
 }
 
-# The elements of something that may be no environment of this package's: `$` of one aborts where
-# an element is missing.
+# The elements of an object that may not be an environment of this package, whose `$` aborts for a
+# missing element.
 members_of <- function(env) {
   names <- c("observation_space", "action_space", "reset", "step", "spec")
   stats::setNames(lapply(names, function(name) env[[name]]), names)
@@ -150,8 +149,7 @@ look_at_end <- function(check, episodes) {
   }
 }
 
-# A step after the end may be an error or have any result, but the next episode must not depend on
-# it.
+# A step after the end may fail or have any result, but the next episode must not depend on it.
 look_beyond_end <- function(check, episode, seed) {
   if (!episode$ended) {
     return()
@@ -196,10 +194,10 @@ look_at_reset_without_seed <- function(check, seed) {
   }
 }
 
-# Notes the first difference between two episodes.
+# Records the first difference between two episodes.
 look_at_difference <- function(check, first, again, seed) {
   note <- function(what, one, other) {
-    # A simulation of contacts, such as Box2D's, may differ in the last digits.
+    # A physics simulation, such as Box2D's, may differ in the last digits.
     close <- isTRUE(all.equal(one, other, tolerance = 1e-5, scale = 1))
     note_finding(check, "seeds", paste0(
       "The same seed, ", seed, ", and the same actions gave different ", what, ": ",
@@ -222,7 +220,7 @@ look_at_difference <- function(check, first, again, seed) {
 
 element_of <- function(out, name) if (is.list(out)) out[[name]] else out
 
-# Of numbers it shows the first that differs.
+# For numbers it shows the first difference.
 difference_text <- function(one, other) {
   if (is.numeric(one) && is.numeric(other) && length(one) == length(other)) {
     at <- which(!mapply(identical, as.vector(one), as.vector(other)))[1L]
@@ -243,7 +241,7 @@ look_at_render <- function(check, seed) {
     return()
   }
   env$reset(seed = seed)
-  # What is plotted goes nowhere.
+  # Discard plots.
   before <- grDevices::dev.cur()
   grDevices::pdf(NULL)
   device <- grDevices::dev.cur()
@@ -264,8 +262,8 @@ can_be_drawn <- function(env) {
 
 # Copies ----------------------------------------------------------------------------------
 
-# An environment in R is played in several copies side by side. What they share outside of their
-# `self`, such as another environment that all of them step, makes one move when another does.
+# An environment in R is played in several copies. If they share something outside their `self`,
+# such as another environment that all of them step, one copy moves when another does.
 look_at_copies <- function(check, first, seed) {
   if (is.null(check$copy) || is_noted(check, "seeds") || !length(first$results)) {
     return(invisible())
@@ -298,7 +296,7 @@ look_at_copies <- function(check, first, seed) {
   }
 }
 
-# What copies share, as far as it can be told from the functions.
+# The objects that copies share, as far as the functions show.
 shared_text <- function(definition) {
   used <- unique(unlist(lapply(definition[c("reset", "step")], function(f) all.names(body(f)))))
   place <- list2env(as.list(definition$parameters), parent = environment(definition$step) %||%

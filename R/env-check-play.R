@@ -1,12 +1,12 @@
-# How check_env() plays an environment, and looks at whatever comes back.
+# check_env() plays an environment with these functions and checks all results.
 
-# Stands for the value of a function that raised an error.
+# The value of a function that raised an error.
 raised <- structure(list(), class = "gym_raised")
 
 has_raised <- function(x) inherits(x, "gym_raised")
 
-# Calls a function of the environment's. An error is a finding, and so is a session's generator
-# that was moved.
+# Calls a function of the environment. An error is a finding, and so is a change of the session's
+# random generator.
 call_and_look <- function(check, topic, place, code) {
   before <- session_random_state()
   value <- tryCatch(code, error = function(cnd) {
@@ -24,7 +24,7 @@ call_and_look <- function(check, topic, place, code) {
 
 session_random_state <- function() list(globalenv()$.Random.seed, RNGkind())
 
-# The errors of this package say themselves what went wrong and where.
+# Errors of this package already say what went wrong and where.
 error_finding <- function(cnd, place) {
   own <- inherits(cnd, "gym_error")
   text <- paste0(if (!own) paste0(place, " raised an error: "), first_line(cnd))
@@ -41,10 +41,10 @@ first_line <- function(cnd) {
   sub("\n.*", "", sub("([^.!?])$", "\\1.", text))
 }
 
-#' Play an episode and look at what comes back
+#' Play an episode and check the results
 #' @param actions The actions, `NULL` to draw them.
-#' @return A list of `observations`, `actions`, `results` (what the steps returned) and `ended`;
-#'   `NULL` where it could not begin.
+#' @return A list of `observations`, `actions`, `results` (of the steps) and `ended`; `NULL` if it
+#'   could not start.
 #' @noRd
 play_and_look <- function(check, seed, actions = NULL) {
   env <- check$env
@@ -59,7 +59,7 @@ play_and_look <- function(check, seed, actions = NULL) {
   drawn <- new_generator(stream = parallel::nextRNGStream(seed_stream(seed)))
   episode <- list(
     observation = observation, actions = list(), results = list(), ended = FALSE,
-    # Only an environment written in R has a generator that can be looked at.
+    # The generator is accessible only in an environment written in R.
     states = if (check$in_r) list(reset = env$random_state())
   )
   for (taken in seq_len(if (is.null(actions)) check$limit else length(actions))) {
@@ -88,7 +88,7 @@ has_ended <- function(out) {
   is.list(out) && (any(out$terminated %in% TRUE) || any(out$truncated %in% TRUE))
 }
 
-# Finding out why one does not fit takes milliseconds, and an episode may have a thousand of them.
+# Explaining a misfit takes milliseconds, and an episode may have a thousand of them.
 most_misfits <- 20L
 
 look_at_observation <- function(check, topic, observation, what) {
@@ -115,7 +115,7 @@ look_at_observation <- function(check, topic, observation, what) {
   }
 }
 
-# The name of the number with this index, where the numbers of a Box have names.
+# The name of the number with this index, if the numbers of a Box have names.
 name_of_number <- function(space, path) {
   index <- suppressWarnings(as.integer(sub("^\\[([0-9]+)\\]$", "\\1", path)))
   name <- space[["names"]][index + 1L]
@@ -148,7 +148,7 @@ look_at_step <- function(check, out, place) {
 
 # Environments written in R --------------------------------------------------------------
 
-# Such an environment without the checks of its own, which end an episode at the first mistake.
+# The environment without its own checks, which end an episode at the first mistake.
 without_checks <- function(env) {
   sub_env <- sub_env_of(env)
   c(

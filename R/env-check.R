@@ -1,40 +1,39 @@
-#' Find what is wrong with an environment
+#' Check an environment
 #'
-#' Looks at the spaces, plays a few episodes with random actions and looks at everything that
-#' comes back, as Gymnasium's `check_env()` does: observations that are not in their space, rewards
-#' that are no finite number, flags that are not `TRUE` or `FALSE`, seeds that do not give the same
-#' episode again, numbers drawn from the session's random generator, episodes that never end,
-#' pictures that cannot be drawn, copies of an environment written in R that move each other because
-#' all of them step the same other environment. It goes on after the first problem wherever it can.
+#' Check the spaces, play a few episodes with random actions and check all results, like Gymnasium's
+#' `check_env()`. It finds observations outside their space, rewards that are not finite numbers,
+#' flags that are not `TRUE` or `FALSE`, seeds that do not reproduce an episode, random numbers from
+#' the session's generator, episodes that never end, frames that cannot be drawn, and copies of an
+#' environment in R that move each other because all step the same other environment. If possible,
+#' it continues after a problem.
 #'
-#' Two episodes are played, with the seeds `seed` and `seed + 1`, and the first of them once more
-#' with the same actions, which must give the same again, bit for bit. All sub-environments of a
-#' vector environment are looked at together, until the first of them ends.
+#' It plays two episodes, with the seeds `seed` and `seed + 1`. It then repeats the first one with
+#' the same actions, which must give the same results, bit for bit. All sub-environments of a vector
+#' environment are checked together, until the first of them ends.
 #'
-#' Where nothing is wrong with an environment made by `gym_env(model = )`, its model is compared
-#' with some 1000 further steps: where play starts, where it leads, for which reward, and whether
-#' the episode ends there must be possible by the model, and what is likely by the model must be
-#' seen.
+#' If an environment made by `gym_env(model = )` has no other problem, its model is compared with
+#' some 1000 further steps. The starting states, next states, rewards and ends must be possible by
+#' the model, and transitions that are likely by the model must occur.
 #'
-#' @param env The environment: one that was made by [gym_env()], a class that inherits from
-#'   [GymEnv], or [gym_make()]; any list or environment with functions `reset(seed)` and
-#'   `step(action)`; or an id such as `"CartPole-v1"`, perhaps with wrappers (see [gym_wrap()]).
-#'   It is reset and stepped; one that is named by its id is made, and closed.
-#' @param ... The environment's own arguments, by name, where it is named by its id.
-#' @param max_steps After how many steps an episode counts as one that never ends, a whole number,
-#'   1000 by default. An environment's own limit of steps is awaited, if it is higher.
+#' @param env The environment: made by [gym_env()], [gym_make()] or a class that inherits from
+#'   [GymEnv]; any list or environment with functions `reset(seed)` and `step(action)`; or an id
+#'   such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]). The check resets and steps it. An
+#'   environment given by its id is made and closed.
+#' @param ... Arguments of the environment, by name, if it is given by its id.
+#' @param max_steps The number of steps after which an episode counts as endless, a whole number,
+#'   1000 by default. A higher limit of the environment itself replaces it.
 #' @param seed The first seed, a whole number from 0 to 2^53.
-#' @param client The client of the server where an environment of Gymnasium's is made.
-#' @return An object of class `gym_check`, which prints what was found: a data frame with a row for
-#'   each finding, none for an environment in which nothing was found, and the columns
+#' @param client The client of the server that makes an environment of Gymnasium.
+#' @return An object of class `gym_check`, which prints the findings: a data frame with a row for
+#'   each finding, without rows if there are none, and the columns
 #'   \describe{
-#'     \item{topic}{What was looked at, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`,
-#'       `"end"`, `"render"`, `"copies"` or `"model"`.}
-#'     \item{severity}{`"wrong"` for what is a mistake, `"note"` for what may be meant.}
-#'     \item{finding}{What was found, a sentence.}
+#'     \item{topic}{The topic, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`, `"end"`,
+#'       `"render"`, `"copies"` or `"model"`.}
+#'     \item{severity}{`"wrong"` for a mistake, `"note"` for something that may be intended.}
+#'     \item{finding}{The finding, a sentence.}
 #'   }
-#' @section Errors: `gym_error_argument` for something that is no environment; those of
-#'   [gym_make()] where one is made. What is wrong with the environment is no error.
+#' @section Errors: `gym_error_argument` for an object that is not an environment. As for
+#'   [gym_make()] if an environment is made. Problems of the environment are findings, not errors.
 #' @seealso [gym_env()], `vignette("own-environment")`
 #' @export
 #' @examples
@@ -70,7 +69,7 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     check$env <- without_checks(env)
     check$definition <- definition_of(env)
     check$copy <- copier_of(env, id, list(...))
-    # It must be reset before it is played again.
+    # Reset it before it is played again.
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
   }
@@ -81,8 +80,8 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   new_check(check)
 }
 
-# A function that makes another sub-environment, as those that play side by side are made; `NULL`
-# for an object of a class, of which there is one.
+# A function that makes another sub-environment in the way a rollout does; `NULL` for an object of a
+# class, which exists only once.
 copier_of <- function(env, id, arguments) {
   definition <- definition_of(env)
   if (!is.null(definition)) {

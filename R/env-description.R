@@ -1,18 +1,17 @@
-# An environment that is named by its id as its server describes it: what it observes, what can be
-# done, where its episodes end. No instance is made for that.
+# A server's description of an environment given by its id: its spaces and its limits. This does not
+# make an instance.
 
-#' Describe an environment whose episodes a server plays by itself
+#' Describe an environment whose episodes a server plays itself
 #'
 #' The server is asked once for each environment.
 #' @param env_id,num_envs,frames,client As for [as_vector_env()].
-#' @param arguments The environment's own arguments, a list.
-#' @return As [as_vector_env()] returns it, without the functions that play, and with `description`,
-#'   a list: `fields`, JSON texts by which a request names the environment, `group`, how many
-#'   episodes share a seed where one generator serves all of them (or `NULL`), `processes`, how many
-#'   play, `needs_max_steps`, whether an episode may go on forever, `versions` and `processor`.
-#'   `NULL` where its episodes are played from R: an environment in R or an object, frames, wrappers
-#'   that remember earlier episodes, arguments that say how sub-environments are made, an older
-#'   server.
+#' @param arguments The arguments of the environment, a list.
+#' @return As [as_vector_env()], without the functions that play, and with `description`, a list:
+#'   `fields`, JSON texts by which a request names the environment, `group`, the number of episodes
+#'   that share a seed if all sub-environments have one generator (or `NULL`), `processes`, the
+#'   number that play, `needs_max_steps`, whether an episode may go on forever, `versions` and
+#'   `processor`. `NULL` if R plays its episodes: an environment in R or an object, frames, wrappers
+#'   that remember earlier episodes, arguments about sub-environments, an older server.
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
@@ -33,7 +32,7 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
   described
 }
 
-# What the server has said of an environment, `NULL` where it does not play it by itself.
+# The server's description of an environment, `NULL` if it does not play it itself.
 known_description <- function(client, env_id, arguments, call) {
   if (!plays_rollouts(client, call)) {
     return(NULL)
@@ -45,12 +44,12 @@ known_description <- function(client, env_id, arguments, call) {
   described
 }
 
-# The names of arguments that are none of the environment's own.
+# The names of arguments that do not belong to the environment.
 how_made <- function() {
   setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
 }
 
-# Whether it is named by an id that a server knows.
+# Whether it is given by an id that a server knows.
 is_made_by_server <- function(env) {
   (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
 }

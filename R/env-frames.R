@@ -1,11 +1,10 @@
-# The frames of an episode, as rollout(frames = TRUE) keeps them: as PNG files, because a frame of
+# The frames of an episode, as kept by rollout(frames = TRUE): as PNG files, because a frame of
 # CartPole takes 3 MB as numbers and 3 kB as a PNG file.
 
 #' Make the frames of an episode
 #' @param files A list of PNG files, each a raw vector.
-#' @param fps How many of them make a second, `NULL` where the environment does not say.
-#' @return An object of class `gym_frames`, a list whose elements unpack when they are
-#'   taken out with `[[`.
+#' @param fps The number of frames per second, `NULL` if the environment does not say.
+#' @return An object of class `gym_frames`, a list whose elements are unpacked by `[[`.
 #' @noRd
 new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
@@ -33,7 +32,7 @@ format.gym_frames <- function(x, ...) {
 
 # Pictures from the server --------------------------------------------------------
 
-# Checks before anything is played whether the environment can be drawn.
+# Checks before play whether the environment can be drawn.
 check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
@@ -66,7 +65,7 @@ png_frame <- function(client, instance_id, call = rlang::caller_env()) {
 }
 
 #' Unpack a frame
-#' @return An object of class `gym_frame`, as [env_render()] gives it.
+#' @return An object of class `gym_frame`, as returned by [env_render()].
 #' @noRd
 frame_from_png <- function(file) {
   check_suggested("png", "unpack a frame")

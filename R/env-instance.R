@@ -1,4 +1,4 @@
-# The instances of environments on a server, as a client knows them.
+# A client's view of the environments on a server.
 
 create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
@@ -56,7 +56,7 @@ close_instance <- function(client, instance_id, call = rlang::caller_env()) {
   }
 }
 
-# Closes an instance that may be gone already.
+# Closes an instance that may not exist any more.
 close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
   tryCatch(
     close_instance(client, instance_id, call),
@@ -67,13 +67,13 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
   )
 }
 
-# The codes of errors that say that an instance is gone, whether it was closed or evicted.
+# The codes of errors for an instance that was closed or removed.
 gone_codes <- c(
   "unknown_instance", "instance_idle_closed", "instance_memory_closed", "call_too_long",
   "environment_died"
 )
 
-# What the client knows of an instance. The server is asked once.
+# The client's knowledge of an instance. The server is asked once.
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   check_client(client, "x", call)
   check_string(instance_id, call = call)
@@ -82,7 +82,7 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
     (instances[[instance_id]] <- ask_instance(client, instance_id, call))
 }
 
-# Calling handlers, such as those of read_values(), do not see that the stack has overflowed.
+# Calling handlers, such as those of read_values(), do not run after a stack overflow.
 read_space <- function(answer, name, space_of) {
   what <- paste0("Its `", name, "`")
   tryCatch(
@@ -99,7 +99,7 @@ ask_instance <- function(client, instance_id, call) {
   new_instance(client, instance_id, answer)
 }
 
-# Makes an instance of what the server says about it, when it creates it or when it is asked.
+# Makes an instance from the server's description, after creating it or on request.
 new_instance <- function(client, instance_id, about) {
   check_about(about)
   instance <- new.env(parent = emptyenv())
@@ -125,13 +125,13 @@ new_instance <- function(client, instance_id, about) {
   instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
   instance$done <- FALSE
-  # One for each combination of a call's flags, prepared when it is first called so.
+  # One for each combination of a call's flags, prepared at the first such call.
   instance$resets <- vector("list", 4L)
   instance$steps <- vector("list", 16L)
   instance
 }
 
-# What a server says of an environment's spec, whether it has made one or only describes it.
+# Reads the server's description of an environment's spec.
 read_spec <- function(env_id, spec) {
   list(
     id = shown_line(env_id),
@@ -149,8 +149,8 @@ wrappers_of <- function(about) {
   as.character(unlist(lapply(about$wrappers, function(wrapper) wrapper["name"])))
 }
 
-# The space of all sub-environments together is made only when it is asked for: the bounds of
-# thousands of pictures take much memory.
+# The space of all sub-environments together is made only on request: the bounds of thousands of
+# pictures take much memory.
 instance_space <- function(instance, which = c("action_space", "observation_space")) {
   if (is.null(instance$num_envs)) {
     return(instance[[paste0("single_", which)]])
@@ -163,7 +163,7 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
 }
 
 # One seed for all, or in a vector environment one for each sub-environment, NA for none; or a list
-# with several for a sub-environment, the later ones for the episodes that it begins by itself.
+# with several for a sub-environment, the later ones for the episodes that it starts itself.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)

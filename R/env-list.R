@@ -1,16 +1,16 @@
-#' List who has which environment on a server
+#' List the environments on a server
 #'
-#' For a server that several sessions share: which environments it runs, for how long,
-#' and when each was last used. [env_list_all()] returns their ids alone.
+#' For a server that several sessions share: list its environments with their names, age and last
+#' use. [env_list_all()] returns only their ids.
 #'
 #' @inheritParams env_registry
-#' @return A data frame with one row for each environment of all of the server's
-#'   clients, the oldest first: `instance_id` (a string, for [env_close()] and the other
-#'   classic calls), `name` (a string, what its owner called it by [gym_make()] or
-#'   [env_create()], `NA` for none), `env_id` (a string), `num_envs` (integer, how many
-#'   sub-environments it has, `NA` for a single environment), `age` and `idle` (double, the seconds
-#'   since it was made and since it was last reset or stepped), `steps` (double, how many it has
-#'   taken, in all sub-environments together) and `watched` (logical, whether somebody watches it).
+#' @return A data frame with one row for each environment of all clients, the oldest first:
+#'   `instance_id` (a string, for [env_close()] and the other classic calls), `name` (a string,
+#'   given by its owner in [gym_make()] or [env_create()], or `NA`), `env_id` (a string), `num_envs`
+#'   (integer, the number of sub-environments, `NA` for a single environment), `age` and `idle`
+#'   (double, the seconds since it was made and since it was last reset or stepped), `steps`
+#'   (double, the number of steps, in all sub-environments together) and `watched` (logical, whether
+#'   somebody watches it).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()

@@ -1,77 +1,71 @@
 #' Make an environment
 #'
-#' Makes an environment that is played with `$reset()` and `$step()`, as
-#' Gymnasium's documentation writes it with a dot. Without a `client` it lives
-#' on the session's own server, which is started when there is none.
+#' Make an environment with the methods `$reset()` and `$step()`, as in Gymnasium's documentation.
+#' By default it is on the session's own server, which is started if necessary.
 #'
-#' The environment is closed by `$close()`, some time after the object itself has been
-#' thrown away, or at the session's end: keep the object for as long as the environment is
-#' played.
+#' The environment is closed by `$close()`, some time after the object is removed, or at the end of
+#' the session. Keep the object as long as you use the environment.
 #'
-#' With `num_envs` it is a vector environment: it has sub-environments, copies of the environment
-#' that are reset and stepped together, with one call for all of them. Observations and actions then
-#' have a row for each sub-environment; [env_reset()] and [env_step()] describe their forms. An
-#' environment's own vector implementation may differ from the single environment in details, such
-#' as the size of the Atari games' pictures.
+#' With `num_envs` it is a vector environment. It has sub-environments, copies of the environment
+#' that one call resets or steps together. Observations and actions then have a row for each
+#' sub-environment; [env_reset()] and [env_step()] describe their forms. An environment's own vector
+#' implementation may differ from the single environment in details, such as the frame size of the
+#' Atari games.
 #'
-#' # Names of what is observed
+#' # Names of observations
 #'
-#' Where Gymnasium's documentation names the numbers of an observation, such as CartPole's, the
-#' vectors that `$reset()` and `$step()` return have these names, and with `num_envs` so have the
-#' columns of the matrix: `observation["pole_angle"]`, `observations[, "pole_angle"]`. The parts of
-#' a Tuple, such as Blackjack's, have names as well. They are the element `names` of
-#' `$single_observation_space`, `NULL` where there are none: in other environments, and where a
-#' wrapper changes what is observed, such as `NormalizeObservation`. The classic calls return
-#' observations without names.
+#' If Gymnasium's documentation names the numbers of an observation, such as CartPole's, the results
+#' of `$reset()` and `$step()` have these names. With `num_envs` they are column names:
+#' `observation["pole_angle"]`, `observations[, "pole_angle"]`. The parts of a Tuple, such as
+#' Blackjack's, have names as well. The names are the element `names` of
+#' `$single_observation_space`. It is `NULL` for other environments and if a wrapper changes the
+#' observations, such as `NormalizeObservation`. The classic calls return observations without
+#' names.
 #'
-#' # After an episode's end
+#' # After the end of an episode
 #'
-#' An environment without `num_envs` wants `$reset()` when a step has returned `done`. With
-#' `num_envs` `autoreset_mode` says what becomes of a sub-environment that has ended while the
-#' others play on. By default, `"NextStep"`, the next `$step()` resets it: its action is not taken,
-#' its observation is the first of the new episode, its reward is 0, and neither `terminated` nor
-#' `truncated` is set. Leave that step out when you sum rewards or count steps, as [rollout()]
-#' does. With `"SameStep"` the step that ends an episode already returns the first observation of
-#' the next one, with `"Disabled"` `$reset(mask = )` does it. Whatever the mode, the element
-#' `next_observation` of what `$step()` returns is what the step led to: the last observation of an
-#' episode that it ended, not the first of the next one.
+#' Without `num_envs`, call `$reset()` after a step has returned `done`. With `num_envs`,
+#' `autoreset_mode` decides about sub-environments that end while others play on. With the default,
+#' `"NextStep"`, the next `$step()` resets them: it ignores the action and returns the first
+#' observation of the new episode, the reward 0, and neither `terminated` nor `truncated`. Leave
+#' that step out when you sum rewards or count steps, as [rollout()] does. With `"SameStep"` the
+#' step that ends an episode already returns the first observation of the next one. With
+#' `"Disabled"` you call `$reset(mask = )`. In all modes, the element `next_observation` of the
+#' result is the observation after the step: at the end of an episode its last one, not the first of
+#' the next.
 #'
 #' @inheritParams env_create
-#' @param ... Further arguments for the environment, by name, such as
-#'   `sutton_barto_reward = TRUE` for CartPole. Every environment takes `max_episode_steps`,
-#'   after how many steps its episodes are cut off, instead of its own limit; -1 for none.
-#'   FrozenLake's random map (`desc = NULL, map_name = NULL`) is drawn from the seed, the same for
-#'   all sub-environments, and stands as `desc` in `$spec$kwargs`.
-#' @param seed The seed of the first reset, unless that is given one, and of the sampling of
-#'   actions: a whole number of at least 0, for a vector environment also one for each
-#'   sub-environment, see [env_reset()]. `NULL`, the default, draws one from R's generator, so that
-#'   [set.seed()] fixes it.
-#' @param client A client, by default that of [gym_client()].
+#' @param ... Further arguments of the environment, by name, such as `sutton_barto_reward = TRUE`
+#'   for CartPole. Every environment accepts `max_episode_steps`, which replaces its own step limit;
+#'   -1 removes it. FrozenLake's random map (`desc = NULL, map_name = NULL`) is drawn from the seed,
+#'   the same for all sub-environments; `$spec$kwargs` has it as `desc`.
+#' @param seed The seed of the first reset (unless `$reset()` gets one) and of action sampling: a
+#'   whole number of at least 0; for a vector environment also one for each sub-environment, see
+#'   [env_reset()]. `NULL`, the default, draws one from R's generator, so [set.seed()] fixes it.
+#' @param client A client. The default is the session's client, [gym_client()].
 #' @return An object of class `gym_env` with
-#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL, infos = TRUE)`:
-#'     starts an episode and returns the first observation, as [env_reset()]; with `infos = FALSE`
-#'     the server makes no infos, which is quicker,
+#'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL, infos = TRUE)`: starts
+#'     an episode and returns the first observation, as [env_reset()]; with `infos = FALSE` the
+#'     server makes no infos, which is faster,
 #'   * `$step(action, which = NULL, infos = TRUE, finals = TRUE)`: takes a step and returns a list,
-#'     as [env_step()]; after an episode's end see below; with `finals = FALSE` its
-#'     `next_observation` is the same as its `observation`,
+#'     as [env_step()]; with `finals = FALSE` its `next_observation` equals its `observation`,
 #'   * `$render(which = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
-#'   * `$close()`: takes it off the server,
+#'   * `$close()`: removes it from the server,
 #'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
-#'   * `$action_space`, `$observation_space`: the spaces, as
-#'     [env_action_space_info()],
+#'   * `$action_space`, `$observation_space`: the spaces, as [env_action_space_info()],
 #'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
 #'     single environment the same,
-#'   * `$num_envs`, `$vectorization_mode`, `$num_workers`, `$autoreset_mode`: how many
-#'     sub-environments there are and what was chosen for them, see [env_create()]; `NULL` in a
-#'     single environment, and `$num_workers` also with a vector implementation,
+#'   * `$num_envs`, `$vectorization_mode`, `$num_workers`, `$autoreset_mode`: the number of
+#'     sub-environments and their settings, see [env_create()]; `NULL` in a single environment.
+#'     `$num_workers` is also `NULL` with a vector implementation,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
-#'     where wrappers have some, too) and `render_fps` (how many frames make a second of it),
-#'     the latter three `NULL` where the environment has none, and `wrappers` (their names),
+#'     including wrappers) and `render_fps` (frames per second), these three `NULL` if the
+#'     environment has none, and `wrappers` (their names),
 #'   * `$client`, `$instance_id`: for the classic calls.
-#' @section Errors: As [env_create()]; `gym_error_server_start` when no server could be
-#'   started; `gym_error_install` when a Python environment was to be installed for it, and
-#'   could not be. `gym_error_argument` for a name after the dollar that the object does not have.
+#' @section Errors: As for [env_create()]. `gym_error_server_start` if no server could be started.
+#'   `gym_error_install` if its Python environment could not be installed. `gym_error_argument` for
+#'   a name after the dollar that the object does not have.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -109,7 +103,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   )
 }
 
-# As gym_make(), but without a seed it draws none.
+# As gym_make(), but does not draw a seed.
 make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NULL,
                           wrappers = list(), client = gym_client(), vectorization_mode = NULL,
                           autoreset_mode = NULL, name = NULL, num_workers = NULL,
@@ -131,7 +125,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
-  # No interrupt may come between creating the instance and keeping its id.
+  # No interrupt may come between creating the instance and storing its id.
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
     create_and_watch(
       client, env_id, seed, render_mode, kwargs, wrappers$server, num_envs, vectorization_mode,
@@ -149,14 +143,14 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   env
 }
 
-# Explains in R's terms an error about an argument that the environment does not have.
+# Rewrites an error about an unknown argument of the environment in R's terms.
 explain_unknown_argument <- function(cnd, given, call) {
   pattern <- "unexpected keyword argument '([^']+)'"
   name <- regmatches(cnd$message, regexec(pattern, cnd$message))[[1L]][2L]
   if (!name %in% given) {
     return()
   }
-  # The last is an argument of all environments.
+  # The last one is an argument of all environments.
   choices <- c(setdiff(names(formals(gym_make)), c("env_id", "...")), "max_episode_steps")
   near <- nearest_name(name, choices)
   gym_abort(
@@ -241,7 +235,7 @@ server_env <- R6Class(
     pid = NULL,
     closed = FALSE,
     finalize = function() {
-      # In a forked child the environment is still the parent's.
+      # In a forked child the environment still belongs to the parent.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
         queue_closing(self$client, self$instance_id)
       }
@@ -249,7 +243,7 @@ server_env <- R6Class(
   )
 )
 
-# `how` says how its sub-environments are run.
+# `how` says how its sub-environments run.
 print_env <- function(env, how, observations, actions) {
   sub_envs <- if (!is.null(env$num_envs)) {
     paste0(", ", count_of(env$num_envs, "sub-environment"), " (", how, ")")
@@ -260,9 +254,9 @@ print_env <- function(env, how, observations, actions) {
   invisible(env)
 }
 
-# A name that an environment does not have is an error. (R's own `$` gives NULL, and calling that
-# fails with "attempt to apply non-function".) `[[` gives NULL. Every step calls this method, so it
-# makes no call that is not needed.
+# A name that an environment does not have is an error. (R's own `$` returns NULL, and calling that
+# fails with "attempt to apply non-function".) `[[` returns NULL. Every step calls this method, so
+# it must be fast.
 #' @export
 `$.gym_env` <- function(x, name) {
   member <- .subset2(x, name)

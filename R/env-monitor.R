@@ -1,40 +1,36 @@
 #' Record an environment's episodes
 #'
-#' From the next reset on the server writes one row for each finished episode
-#' into a table, `episodes.csv`: its number, return, length in steps and seconds.
-#' Videos are recorded where `video_callable` asks for them. `env_monitor_close()`,
-#' or closing the environment, ends the monitor and finishes its files; where there
-#' is no monitor it does nothing.
+#' From the next reset on, the server writes a row for each finished episode into a table,
+#' `episodes.csv`: its number, return, length in steps and seconds. It records videos of the
+#' episodes that `video_callable` selects. `env_monitor_close()`, or closing the environment, ends
+#' the monitor and finishes its files. Without a monitor it does nothing.
 #'
-#' @section Files: A monitor has a directory of its own, with the table, `episodes.csv`, and
-#'   videos with the number of their episode, `rl-video-episode-0.mp4`. When another monitor
-#'   writes in `directory`, of this server or of another one, that is a directory below it with
-#'   the name of the `instance_id`, such as `1a2b3c4d`.
+#' @section Files: A monitor has its own directory, with the table, `episodes.csv`, and videos named
+#'   by the number of their episode, such as `rl-video-episode-0.mp4`. If another monitor, of this
+#'   server or another one, writes in `directory`, the new one uses a directory below it with the
+#'   name of the `instance_id`, such as `1a2b3c4d`.
 #'   `list.files(directory, "^episodes[.]csv$", recursive = TRUE)` finds all tables.
 #' @inheritParams env_reset
-#' @param directory Where the server writes, a string: a path below the server's
-#'   directory for monitors (its option `--monitor-dir`), or, for a server on
-#'   this machine, below the system's directory for temporary files. A server
-#'   started from R without `monitor_dir` has a new temporary directory for relative
-#'   paths: name an absolute one, such as `file.path(tempdir(), "runs")`, or start it
-#'   by `gym_server_start(monitor_dir = "runs")`.
-#' @param force Whether to delete what monitors have left in the directory that are gone:
-#'   closed, or ended with their server. Files of monitors that still write, and all other
-#'   files, are never touched. Default `FALSE`.
-#' @param resume Whether to go on counting where an earlier monitor stopped: this
-#'   instance's, where it has a directory below, else the first one's. Default `FALSE`: a
-#'   directory with the files of a monitor that is gone is refused.
-#' @param video_callable Which episodes to record as videos: `FALSE`, the
-#'   default, for none, `TRUE` for each, or a whole number n for every n-th,
-#'   beginning with the first. Needs the server's extra `video` (the Python
-#'   package moviepy).
+#' @param directory The directory for the server's files, a string: a path below the server's
+#'   directory for monitors (its option `--monitor-dir`), or, for a server on this machine, below
+#'   the system's directory for temporary files. A server started from R without `monitor_dir` has a
+#'   new temporary directory for relative paths. Use an absolute path, such as
+#'   `file.path(tempdir(), "runs")`, or start the server by
+#'   `gym_server_start(monitor_dir = "runs")`.
+#' @param force Delete the files of monitors that were closed or ended with their server? Files of
+#'   active monitors and all other files are never touched. The default is `FALSE`.
+#' @param resume Continue the numbering of an earlier monitor? This is the one of this instance if
+#'   it has a directory below, otherwise the first one. The default is `FALSE`, which refuses a
+#'   directory with the files of an earlier monitor.
+#' @param video_callable Which episodes to record as videos: `FALSE`, the default, for none, `TRUE`
+#'   for all, or a whole number n for every n-th, starting with the first. Requires the server's
+#'   extra `video` (the Python package moviepy).
 #' @return Nothing, invisibly.
-#' @section Errors: `gym_error_http_400` for an unknown instance, a directory
-#'   that is refused, a monitor that is active already, or videos that cannot be made, with
-#'   the reason; `gym_error_http_429` when all monitors together have written as much as the server
-#'   allows (`max_monitor_mb` of [gym_server_start()]): a monitor stops recording then, the
-#'   environment goes on, and closing either raises the error; `gym_error_argument`;
-#'   `gym_error_connection`.
+#' @section Errors: `gym_error_http_400` for an unknown instance, a directory that is refused, a
+#'   monitor that is already active, or videos that cannot be made, with the reason.
+#'   `gym_error_http_429` if all monitors together have written as much as the server allows
+#'   (`max_monitor_mb` of [gym_server_start()]): a monitor then stops recording, the environment
+#'   goes on, and closing either raises the error. `gym_error_argument`; `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

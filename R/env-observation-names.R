@@ -1,7 +1,7 @@
-# What the parts of an observation are called, from the tables "Observation
-# Space" in Gymnasium's documentation of each environment
-# (https://gymnasium.farama.org/environments/classic_control/, toy_text/, box2d/ and
-# mujoco/). Other environments, and those that show another number of parts, have no names.
+# The names of the parts of observations, from the tables "Observation Space" in Gymnasium's
+# documentation of each environment (https://gymnasium.farama.org/environments/classic_control/,
+# toy_text/, box2d/ and mujoco/). Other environments, and those with another number of parts, have
+# no names.
 
 observation_parts <- list(
   Acrobot = c(
@@ -58,13 +58,13 @@ observation_parts <- list(
 )
 observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 
-# Wrappers after which a number is no longer what the documentation calls by its name.
+# After these wrappers a number no longer matches its name in the documentation.
 changing_wrappers <- c("DiscretizeObservation", "NormalizeObservation", "RescaleObservation")
 
-#' Name the numbers or parts of what is observed
+#' Name the numbers or parts of observations
 #' @param space The observation space of one sub-environment.
 #' @param wrappers The names of the wrappers around the environment.
-#' @return Strings, `NULL` where they are unknown, or a wrapper has changed what is observed.
+#' @return Strings; `NULL` if they are unknown, or a wrapper has changed the observations.
 #' @noRd
 observation_names <- function(env_id, space, wrappers = character()) {
   parts <- observation_parts[[environment_family(env_id), exact = TRUE]]

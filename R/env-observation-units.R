@@ -1,9 +1,9 @@
-# What the parts of an observation are measured in, and between which values an episode
-# goes on: from the sections "Observation Space" and "Episode End" in Gymnasium's
-# documentation of each environment (https://gymnasium.farama.org/environments/) and,
-# where that is silent, from the code it documents: CartPole computes in metres, kilograms
-# and seconds (gravity 9.8), Pendulum's docs define theta in radians. Parts whose unit
-# neither has, such as LunarLander's coordinates, have none.
+# The units of the parts of observations, and the values between which an episode goes on: from the
+# sections "Observation Space" and "Episode End" in Gymnasium's documentation of each environment
+# (https://gymnasium.farama.org/environments/). If these say nothing, they come from the documented
+# code: CartPole computes in metres, kilograms and seconds (gravity 9.8), and Pendulum's
+# documentation defines theta in radians. Parts without a unit in either, such as LunarLander's
+# coordinates, have none.
 
 observation_units <- list(
   Acrobot = c(angular_velocity_theta1 = "rad/s", angular_velocity_theta2 = "rad/s"),
@@ -17,7 +17,7 @@ observation_units <- list(
 )
 observation_units$LunarLanderContinuous <- observation_units$LunarLander
 
-# Numbers at which an episode ends: by failure, or at the goal.
+# Values at which an episode ends: by failure, or at the goal.
 episode_limits <- list(
   CartPole = list(
     cart_position = list(at = c(-2.4, 2.4), kind = "failure", text = "fails at \u00b12.4"),
@@ -34,9 +34,9 @@ episode_limits <- list(
 )
 episode_limits$LunarLanderContinuous <- episode_limits$LunarLander
 
-#' Write the name of a part of an observation for people, with its unit
+#' Write the name of a part of an observation with its unit
 #' @param names Names of columns of a table of steps.
-#' @return Strings such as `"pole angle (rad)"`; unknown names stay as they are.
+#' @return Strings such as `"pole angle (rad)"`; unknown names are unchanged.
 #' @noRd
 observation_labels <- function(env_id, names) {
   family <- environment_family(env_id)

@@ -1,35 +1,36 @@
 #' A class of environments to inherit from
 #'
-#' An R6 class that inherits from `GymEnv` is an environment written in R: it has methods `reset()`
-#' and `step()`, as a Python class that inherits from Gymnasium's `Env`. [gym_env()] makes an
-#' environment of functions instead.
+#' Write a class of environments in R as an R6 class that inherits from `GymEnv`, with methods
+#' `reset()` and `step()`, like a Python class that inherits from Gymnasium's `Env`. [gym_env()]
+#' makes an environment from functions instead.
 #'
-#' The class that inherits has
-#' * a method `reset()`, which returns the first observation. It may have an argument `options` and
-#'   an argument `seed`; without one the seed is set all the same, see below.
+#' Your class has
+#' * a method `reset()`, which returns the first observation. It may have the arguments `options`
+#'   and `seed`. The seed is set even without such an argument, see below.
 #' * a method `step(action)`, which returns a list of `observation`, `reward` (a number),
-#'   `terminated` (whether the episode ended by the environment's own rules) and perhaps `truncated`
-#'   (whether it was cut off; `FALSE` without it) and `info` (a list).
-#' * perhaps a method `render()`, which either plots, or returns a picture, as in [gym_env()].
-#' * the two spaces, either as public fields `observation_space` and `action_space`, or given to
+#'   `terminated` (whether the episode ended by the environment's own rules) and optionally
+#'   `truncated` (whether it was cut off; default `FALSE`) and `info` (a list).
+#' * optionally a method `render()`, which either plots or returns a picture, as in [gym_env()].
+#' * the two spaces, either as public fields `observation_space` and `action_space`, or as arguments
+#'   of `super$initialize()`.
 #'   `super$initialize()`.
 #'
-#' `$new()` calls `super$initialize()`, with the arguments of the list below. From then on
-#' `env$reset()` and `env$step()` check what goes in and what comes out, count the steps, and
-#' draw from the environment's own random generator, as described at [gym_env()].
+#' `$new()` calls `super$initialize()`, with the arguments listed below. From then on `env$reset()`
+#' and `env$step()` check arguments and results, count the steps, and draw from the environment's
+#' own random generator, as described at [gym_env()].
 #'
 #' @section Arguments of `super$initialize()`:
-#' * `observation_space`, `action_space`: the spaces; by default the fields of these names.
-#' * `id`: what the environment is called, a string; by default the name of the class.
-#' * `max_episode_steps`: after how many steps an episode is cut off, a whole number; `NULL`, the
-#'   default, for never.
-#' * `reward_threshold`: the mean return from which it counts as solved, a number; `NULL`, the
+#' * `observation_space`, `action_space`: the spaces. The default is the fields of these names.
+#' * `id`: the name of the environment, a string. The default is the name of the class.
+#' * `max_episode_steps`: the number of steps after which an episode is cut off, a whole number.
+#'   `NULL`, the default, for no limit.
+#' * `reward_threshold`: the mean return from which it counts as solved, a number. `NULL`, the
 #'   default, for none.
-#' * `render_fps`: how many frames make a second, a number; `NULL`, the default, for 30.
+#' * `render_fps`: the number of frames per second. `NULL`, the default, for 30.
 #'
-#' @return `GymEnv` is an R6 generator. Its objects, of class `gym_r_env` and `gym_env`, have what
-#'   those of [gym_env()] have, and the fields and methods of their own class.
-#' @section Errors: As [gym_env()]. `gym_error_argument` also for a class that has no method
+#' @return `GymEnv` is an R6 generator. Its objects, of class `gym_r_env` and `gym_env`, have the
+#'   elements of those of [gym_env()] and the fields and methods of their own class.
+#' @section Errors: As for [gym_env()]. `gym_error_argument` also for a class without a method
 #'   `reset()` or `step()`.
 #' @seealso [gym_env()], [gym_register()]
 #' @name GymEnv
@@ -120,7 +121,7 @@ sub_env_of <- function(env) {
   sub_env
 }
 
-# Sets what an object shows of its sub-environment.
+# Sets the fields that show the state of an object's sub-environment.
 become_sub_env <- function(env, sub_env) {
   traits <- sub_env$traits
   n <- sub_env$num_envs
@@ -144,7 +145,7 @@ replace_methods <- function(env, methods) {
   rlang::env_binding_lock(env, names(methods))
 }
 
-# The sub-environment that an object's own methods play.
+# The sub-environment that plays an object's own methods.
 class_sub_env <- function(env, traits) {
   reset <- env$reset
   takes <- intersect(c("seed", "options"), names(formals(reset)))

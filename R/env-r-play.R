@@ -1,6 +1,6 @@
-# Environments written in R, played step by step as those of gym_make() are.
+# Environments written in R, played step by step like those of gym_make().
 
-# The methods by which an environment is played, whatever its own functions are.
+# The methods that play an environment, for any functions of the user.
 checked_methods <- function(sub_env) {
   list(
     reset = function(seed = NULL, options = NULL, return_info = FALSE) {

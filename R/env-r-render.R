@@ -1,10 +1,10 @@
-# Pictures of environments written in R. A function of the user's either plots, which is caught by a
-# png() device, or returns a picture.
+# Frames of environments written in R. The user's function either plots, on a png() device, or
+# returns a picture.
 
-# The size of what is plotted, in pixels: that of CartPole's frames.
+# The size of a plot in pixels: that of CartPole's frames.
 plotted_size <- c(width = 600L, height = 400L)
 
-# A picture of few pixels, such as one for each cell of a grid, is enlarged to about this width.
+# A small picture, such as one pixel for each cell of a grid, is enlarged to about this width.
 least_width <- 240L
 
 render_r_env <- function(sub_env, call = rlang::caller_env()) {
@@ -32,7 +32,7 @@ sub_env_png <- function(sub_env, call = rlang::caller_env()) {
 }
 
 #' Call the user's function that draws
-#' @return The bytes of a PNG file where it plots, a `gym_frame` where it returns a picture.
+#' @return The bytes of a PNG file if it plots, a `gym_frame` if it returns a picture.
 #' @noRd
 draw_sub_env <- function(sub_env, call) {
   picture <- NULL
@@ -67,9 +67,9 @@ abort_render <- function(cnd, sub_env, call) {
 
 #' Run code that plots, on a device that writes a PNG file
 #'
-#' The device that was current remains so.
+#' The current device stays current.
 #' @param size Width and height in pixels.
-#' @return The bytes of the file, `NULL` where nothing was plotted.
+#' @return The bytes of the file, `NULL` if nothing was plotted.
 #' @noRd
 plot_as_png <- function(size, code) {
   file <- temporary_file(fileext = ".png")
@@ -105,7 +105,7 @@ frame_from_picture <- function(picture, sub_env, call) {
   )
 }
 
-# A matrix of the colours of a picture. Numbers are shares of 1, or whole numbers of up to 255.
+# The colours of a picture as a matrix. Numbers are shares of 1, or whole numbers up to 255.
 as_colours <- function(picture) {
   raster <- if (is.numeric(picture)) {
     as.raster(picture, max = if (max(picture, 0, na.rm = TRUE) > 1) 255 else 1)

@@ -1,16 +1,16 @@
-# A sub-environment written in R: the functions that play it, and how far it has come. An
-# environment of its own is one of these; a vectorised one has all its sub-environments in one.
+# A sub-environment written in R: its functions and its state. A single environment has one of
+# these; a vectorised one has all its sub-environments in one.
 
 #' Make a sub-environment
 #'
 #' @param reset A function of `seed` and `options` that returns the first observation.
-#' @param step A function of an action, as the user's `step()`.
-#' @param render A function without arguments that draws it, `NULL` where there is none.
-#' @param takes_options Whether the user's `reset()` takes options.
-#' @param num_envs `NULL`, or how many sub-environments a vectorised one has.
-#' @return An environment: these, and `generator`, its random generator, `NULL` before the first
-#'   need; `taken`, how many steps the episode has taken, `NA` before the first reset; `ended`,
-#'   whether it has ended, `NA` when it was warned of that; `closed`.
+#' @param step A function of an action, like the user's `step()`.
+#' @param render A function without arguments that draws it, or `NULL`.
+#' @param takes_options Whether the user's `reset()` accepts options.
+#' @param num_envs `NULL`, or the number of sub-environments of a vectorised one.
+#' @return An environment: these, and `generator`, its random generator, `NULL` before first use;
+#'   `taken`, the number of steps in the episode, `NA` before the first reset; `ended`, whether it
+#'   has ended, `NA` after the warning; `closed`.
 #' @noRd
 new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALSE,
                         num_envs = NULL) {
@@ -28,7 +28,7 @@ new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALS
   sub_env
 }
 
-#' Make what a user's functions return plain numbers, where it is an integer64
+#' Convert integer64 in the results of a user's functions to plain numbers
 #' @param functions A list of `reset` and `step`.
 #' @noRd
 plain_results <- function(functions) {
@@ -41,9 +41,9 @@ plain_results <- function(functions) {
 
 #' Start an episode
 #'
-#' @param seed What its generator is to begin with; `NULL` goes on with the generator as it is. An
-#'   environment that was never seeded draws a seed from the session's generator.
-#' @return The first observation, checked: one, or a batch of those of a vectorised one.
+#' @param seed The seed of its generator; `NULL` continues the generator. An environment that was
+#'   never seeded draws a seed from the session's generator.
+#' @return The first observation, checked: one, or a batch for a vectorised environment.
 #' @noRd
 reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number = NULL,
                           call = rlang::caller_env()) {
@@ -73,8 +73,8 @@ reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number =
 
 #' Take a step
 #'
-#' @param action One action that was checked, or a batch of them for a vectorised one.
-#' @return What the user's `step()` returned, unchecked.
+#' @param action One checked action, or a batch of them for a vectorised environment.
+#' @return The result of the user's `step()`, unchecked.
 #' @noRd
 raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::caller_env()) {
   check_was_reset(sub_env, call)
@@ -96,12 +96,12 @@ check_was_reset <- function(sub_env, call) {
   }
 }
 
-#' Say that a function of the user's raised an error, and where
+#' Report an error in the user's function, with its place
 #'
-#' The classes of the error stay, so that it can be caught by them.
+#' The error keeps its classes, so that users can catch it by them.
 #' @noRd
 abort_raised <- function(cnd, sub_env, sub_env_number, call) {
-  # A wrapper's error says itself what went wrong.
+  # A wrapper's error already says what went wrong.
   if (inherits(cnd, "gym_error_wrapper")) return(invisible())
   taken <- sub_env$taken
   where <- if (is.na(taken)) "`reset()` of " else "`step()` of "

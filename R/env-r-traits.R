@@ -1,12 +1,12 @@
-# What is fixed of an environment written in R: its spaces and its spec, with the checks that every
-# step makes, which are prepared once.
+# The constant part of an environment written in R: its spaces and its spec, and the checks of every
+# step, which are prepared once.
 
 #' Describe an environment written in R
 #'
-#' @return A list: `observation_space`, `action_space`, `spec`; `limit`, after how many steps an
-#'   episode is cut off, `Inf` for never; `action_rules`, the action space without the bounds of
-#'   its Boxes, because a Box action outside of its bounds goes to the environment as in Gymnasium;
-#'   `fits_observations` and `fits_actions`, quick checks of batches.
+#' @return A list: `observation_space`, `action_space`, `spec`; `limit`, the number of steps after
+#'   which an episode is cut off, `Inf` for never; `action_rules`, the action space without the
+#'   bounds of its Boxes, because a Box action outside its bounds is passed to the environment as in
+#'   Gymnasium; `fits_observations` and `fits_actions`, fast checks of batches.
 #' @noRd
 new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
                        reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
@@ -32,7 +32,7 @@ new_traits <- function(observation_space, action_space, id, max_episode_steps = 
   )
 }
 
-# The same environment under another id, or with another limit: `changes` are elements of its spec.
+# The same environment with another id or limit: `changes` are elements of its spec.
 change_traits <- function(traits, changes) {
   traits$spec[names(changes)] <- changes
   traits$limit <- traits$spec$max_episode_steps %||% Inf
@@ -72,11 +72,11 @@ check_actions <- function(traits, action, which, call) {
   }
 }
 
-#' Put a value into the form that a server's has
+#' Convert a value to the form of a server's values
 #'
-#' Whole numbers are integers, and the parts of a Dict are in the order of the space, whatever a
-#' function has made of them; where the space has names the numbers have them.
-#' @param n Of how many values it is a batch; `NULL` for a single value.
+#' Whole numbers become integers, the parts of a Dict get the order of the space, and numbers get
+#' the names of the space, if it has any.
+#' @param n The number of values in a batch; `NULL` for a single value.
 #' @noRd
 tidy_value <- function(space, value, n) {
   if (inherits(space, "gym_space_discrete")) {
@@ -111,7 +111,7 @@ narrow_if_double <- function(x) {
 
 as_integer_if_small <- function(x) if (within_integer(x)) as.integer(x) else as.numeric(x)
 
-#' Make a function that takes one action out of a batch that was checked
+#' Make a function that takes one action from a checked batch
 #' @noRd
 action_picker <- function(space) {
   if (inherits(space, "gym_space_discrete")) {
@@ -123,7 +123,7 @@ action_picker <- function(space) {
   }
 }
 
-# A logical vector of Discrete actions counts as 0 and 1.
+# TRUE counts as 1 for Discrete actions.
 tidy_actions <- function(space, action) {
   if (inherits(space, "gym_space_discrete")) {
     narrow_if_double(action)

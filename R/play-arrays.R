@@ -1,9 +1,9 @@
-# The steps of a rollout as arrays, for those who write learners, which go through time.
+# The steps of a rollout as arrays by time, for people who write learners.
 
 #' Put the steps of batches into arrays by time and sub-environment
 #'
-#' A sub-environment's episodes follow one another in time. Where it played fewer steps than another
-#' the arrays end with `NA`.
+#' The episodes of a sub-environment follow one another. If it played fewer steps than another, its
+#' arrays end with `NA`.
 #' @inheritParams steps_table
 #' @return An object of class `gym_arrays`, a list of arrays.
 #' @noRd
@@ -26,17 +26,17 @@ steps_arrays <- function(batches, episodes, vector_env, several = FALSE,
       array_in_time(observed, each("next_observation"), cells)
     }
   )
-  # An episode that `max_steps` cut short is truncated in its last step.
+  # An episode that `max_steps` cuts off is truncated in its last step.
   arrays$truncated[cells$last] <- episodes$truncated
   structure(arrays[lengths(arrays) > 0L], class = "gym_arrays")
 }
 
 #' Find the place of each step in arrays by time and sub-environment
 #' @param row The row of its episode in the table of episodes, for each step.
-#' @param counts How many steps were taken together, in the order in which they were played.
-#' @return A list: `dim`, how many times and sub-environments there are; `at`, the place of each
-#'   step when the sub-environments follow one another; `to`, which of the steps is the last of
-#'   those taken together; `counts`; and `last`, the places of the episodes' last steps.
+#' @param counts The number of steps taken together, in the order of play.
+#' @return A list: `dim`, the numbers of times and sub-environments; `at`, the place of each step,
+#'   one sub-environment after the other; `to`, the last step of those taken together; `counts`; and
+#'   `last`, the places of the episodes' last steps.
 #' @noRd
 cells_in_time <- function(row, episodes, counts) {
   ended <- stats::ave(episodes$length, episodes$sub_env, FUN = cumsum)
@@ -58,8 +58,8 @@ numbers_in_time <- function(values, cells) {
 
 #' Put batches of values into an array by time and sub-environment
 #'
-#' Each batch goes straight to its place: beside the batches and the array nothing as large is made.
-#' @param values A list of batches, one for each step taken together.
+#' Each batch is copied directly to its place, without another large copy.
+#' @param values A list of batches, one for each time that steps were taken together.
 #' @return An array; a list of arrays for the parts of a Tuple or Dict.
 #' @noRd
 array_in_time <- function(space, values, cells) {
@@ -91,7 +91,7 @@ with_time <- function(numbers, cells, space = NULL) {
   numbers
 }
 
-# Checks before anything is played whether the steps fit into arrays.
+# Checks before play whether the steps fit into arrays.
 check_fits_arrays <- function(vector_env) {
   for (what in c("observation", "action")) {
     space <- vector_env[[paste0(what, "_space")]]
@@ -140,7 +140,7 @@ array_lines <- function(arrays) {
   paste(format(paste0(names(flat), ":")), kinds, shapes)
 }
 
-# The arrays of Tuple and Dict under the names of their parts, such as `observation$position`.
+# The arrays of Tuple and Dict, named by their parts, such as `observation$position`.
 flat_arrays <- function(arrays, prefix = "") {
   parts <- names(arrays) %||% seq_along(arrays)
   each <- lapply(seq_along(arrays), function(i) {

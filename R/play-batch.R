@@ -1,40 +1,39 @@
-# A batch of episodes is played by a function that changes nothing: what comes of it depends on the
-# environment, the policy, the seeds and the random stream alone. So a batch that was lost can be
-# played again, and it does not matter in which order batches are played, and by whom.
+# A function that changes nothing plays a batch of episodes. The result depends only on the
+# environment, the policy, the seeds and the random stream. So a lost batch can be played again, in
+# any order and on any worker.
 #
-# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. Which of them
-# plays an episode is written down before the first step. If the next one were given to whichever
-# ends first, and playing stopped at the number of episodes asked for, short episodes would be
-# favoured.
+# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch; this is fixed
+# before the first step. If the next episode went to whichever sub-environment ends first and
+# playing stopped at a number of episodes, short episodes would be favoured.
 
 #' Play a batch of episodes
 #'
-#' Draws from the batch's own stream; the session's generator stays as it was. An error or an
+#' Draws from the batch's own stream; the session's generator is left as it was. An error or an
 #' interrupt ends it without a result.
-#' @param vector_env As [as_vector_env()] returns it.
+#' @param vector_env As returned by [as_vector_env()].
 #' @param policy The policy, bound to the environment: one, or the candidates that play the batch.
 #' @param episodes A list of vectors with an element for each episode: `candidate` (the number of
-#'   that which plays it), `episode` (its number among those of the candidate) and `seed`.
+#'   the candidate that plays it), `episode` (its number among the candidate's episodes) and `seed`.
 #' @param stream The stream that the policy draws from.
-#' @param max_steps After how many steps an episode is cut short.
-#' @param target The mean return of a candidate that makes later candidates needless, `NULL` for
-#'   none; `each`, how many episodes a candidate plays.
-#' @param keep_moments Whether to keep the moments of the observations that were acted on.
+#' @param max_steps The number of steps after which an episode is cut off.
+#' @param target The mean return of a candidate after which later candidates need not be played,
+#'   `NULL` for none.
+#' @param each The number of episodes of a candidate.
+#' @param keep_moments Whether to keep the moments of the observations before each action.
 #' @param keep_steps,keep_next Whether to keep each step, and the observation after it.
-#' @param learner `NULL`, or a list of two functions that take the place of the policy: `act` of the
-#'   observations and the numbers of their sub-environments, and `observe` of what each step came
-#'   to, see [agent_observe()].
-#' @param report A function that is called with how many episodes have ended so far.
+#' @param learner `NULL`, or a list of two functions that replace the policy: `act` of the
+#'   observations and the numbers of their sub-environments, and `observe` of the results of each
+#'   step, see [agent_observe()].
+#' @param report A function that is called with the number of finished episodes.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
 #'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`
-#'   (of one, those of all).
-#'   Candidates after one that has reached the target are left out.
+#'   (of one, those of all). Candidates after one that has reached the target are left out.
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
                        each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
                        learner = NULL, report = function(ended) NULL) {
-  # Products of matrices by R itself: a row of them is the same, to the last bit, whatever rows are
-  # beside it, which is not so with every library of linear algebra.
+  # Let R itself multiply matrices: a row of the product then does not depend on the other rows, to
+  # the last bit. This does not hold for every library of linear algebra.
   matprod <- options(matprod = "internal")
   on.exit(options(matprod))
   n <- length(episodes$episode)
@@ -45,7 +44,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     seed = episodes$seed, sub_env = (seq_len(n) - 1L) %% at_once + 1L,
     return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
-    # Whose observations count must not depend on when others end.
+    # Which observations count must not depend on when other episodes end.
     target = if (!keep_moments) target, each = each,
     steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = with_memory(policy, at_once), max_steps = max_steps,
@@ -53,7 +52,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     clips = clips_actions(policy),
     moments = if (keep_moments) no_moments(), noted = list()
   )
-  # Where all sub-environments must be reset together, they wait for each other after each episode.
+  # If all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n
   play <- function() {
     for (first in seq(1L, n, by = together)) {
@@ -73,7 +72,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   c(episodes, kept)
 }
 
-# An error of the environment names the user's call, not the step that was taken for it.
+# An error of the environment names the user's call, not the internal step.
 naming_call <- function(code, vector_env) {
   withCallingHandlers(
     code,
@@ -86,9 +85,9 @@ naming_call <- function(code, vector_env) {
   )
 }
 
-# Plays the episodes from `first` to `last` of a batch. What changes with each step is `playing`:
-# `rows` has an element for each sub-environment that plays (which episode of the batch, its number,
-# the return so far, and how many steps had been taken when the episode began), `observation` a row;
+# Plays the episodes from `first` to `last` of a batch. `playing` is the state that changes with
+# each step: `rows` has an element for each running sub-environment (the episode of the batch, its
+# number, the return so far, and the number of steps before the episode began), `observation` a row.
 # `acting` is the policy for these rows, whose candidates are `candidate`.
 play_episodes <- function(batch, first, last) {
   vector_env <- batch$vector_env
@@ -125,7 +124,7 @@ play_episodes <- function(batch, first, last) {
   add_noted(batch)
 }
 
-# What a learner is told of a step. An episode that `max_steps` cuts short is truncated.
+# The transitions of a step for a learner. An episode that `max_steps` cuts off is truncated.
 transitions_of <- function(batch, playing, action, out) {
   rows <- playing$rows
   cut <- playing$taken + 1L - rows$began >= batch$max_steps
@@ -137,8 +136,8 @@ transitions_of <- function(batch, playing, action, out) {
   )
 }
 
-#' Note what came of a step, and begin the next episodes where some have ended
-#' @param out As a step of [as_vector_env()] returns it.
+#' Record the results of a step, and start the next episodes
+#' @param out As returned by a step of [as_vector_env()].
 #' @noRd
 end_step <- function(batch, playing, action, out) {
   rows <- playing$rows
@@ -155,7 +154,7 @@ end_step <- function(batch, playing, action, out) {
   }
   playing$observation <- out$observation
   ended <- out$terminated | out$truncated
-  # Where an episode is cut short the environment begins no other by itself.
+  # After cutting an episode off, the environment does not start the next one itself.
   waiting <- if (isTRUE(batch$vector_env$begins_next)) !ended else TRUE
   if (batch$max_steps < Inf) {
     ended <- ended | playing$taken - rows$began >= batch$max_steps
@@ -168,7 +167,7 @@ end_step <- function(batch, playing, action, out) {
   }
 }
 
-# `waiting` are those that have `ended` and that the environment does not begin by itself.
+# `waiting` are those of `ended` that the environment does not restart itself.
 begin_next_episodes <- function(batch, playing, ended, waiting) {
   vector_env <- batch$vector_env
   rows <- playing$rows
@@ -198,8 +197,8 @@ begin_next_episodes <- function(batch, playing, ended, waiting) {
   }
 }
 
-# Puts the first observations of the episodes that the environment does not begin by itself in the
-# place of the last observations of those before.
+# Replaces the last observations by the first ones of new episodes that the environment does not
+# start itself.
 begin_waiting <- function(batch, playing, waiting) {
   episode <- playing$rows$episode
   begun <- begin_episodes(batch, episode[waiting], playing$last)
@@ -211,9 +210,9 @@ begin_waiting <- function(batch, playing, waiting) {
   }
 }
 
-# Resets the sub-environments of the episodes that begin. Where all must be reset together, those
-# that play none are left out of what it returns. One that begins its next episodes by itself gets
-# the seeds of all of them, up to the episode `last`.
+# Resets the sub-environments of new episodes. If all must be reset together, the result omits those
+# that do not play. A sub-environment that restarts itself gets the seeds of all its episodes, up to
+# the episode `last`.
 begin_episodes <- function(batch, episode, last) {
   vector_env <- batch$vector_env
   sub_envs <- batch$sub_env[episode]
@@ -233,7 +232,7 @@ begin_episodes <- function(batch, episode, last) {
   observation
 }
 
-# A function is asked about a single episode before it plays several of them side by side.
+# Call a function with a single observation before it plays several episodes together.
 ask_beforehand <- function(batch, episode, observation, begun = seq_along(episode)) {
   policy <- batch$policy
   vector_env <- batch$vector_env
@@ -250,7 +249,7 @@ ask_beforehand <- function(batch, episode, observation, begun = seq_along(episod
   }
 }
 
-# Frames are kept where there is one sub-environment, which plays one episode after the other.
+# Frames are kept with one sub-environment, which plays one episode after the other.
 keep_frame <- function(batch, episode) {
   frame <- batch$vector_env$frame
   if (!is.null(frame)) {
@@ -259,8 +258,8 @@ keep_frame <- function(batch, episode) {
   }
 }
 
-# An episode that the environment neither terminated nor truncated was cut short by `max_steps`,
-# which counts as truncated.
+# An episode that the environment neither terminated nor truncated was cut off by `max_steps`, which
+# counts as truncated.
 end_episodes <- function(batch, at, returns, length, out) {
   batch$return[at] <- returns
   batch$length[at] <- length
@@ -273,9 +272,9 @@ end_episodes <- function(batch, at, returns, length, out) {
   }
 }
 
-# How many of some candidates' episodes are needed: those up to the first candidate whose mean
-# return reaches the target. One before it that is not yet played to its end, as far as its returns
-# are missing, is played on, because it may reach the target, too.
+# The number of episodes that are needed: those up to the first candidate whose mean return reaches
+# the target. An earlier candidate with missing returns is played to its end, because it may reach
+# the target, too.
 needed_episodes <- function(returns, each, target) {
   if (length(returns) < each) {
     return(length(returns))
@@ -286,11 +285,11 @@ needed_episodes <- function(returns, each, target) {
 
 # Moments of observations ------------------------------------------------------------------
 
-# How many steps are noted before their observations are added to the moments: adding takes R as
-# long for a few rows as for hundreds. The number depends on the size of an observation alone.
+# The number of steps to collect before their observations are added to the moments: R takes as long
+# to add a few rows as hundreds. It depends only on the size of an observation.
 steps_together <- function(numbers) max(1L, min(64L, 8192L %/% numbers))
 
-# Notes the observations that a step was taken from.
+# Collects the observations before a step.
 note_observations <- function(batch, playing) {
   values <- number_rows(playing$observation)
   batch$noted[[length(batch$noted) + 1L]] <- values

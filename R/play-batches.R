@@ -1,22 +1,22 @@
-# Episodes of many candidates: those that the server plays by itself are all asked for together
-# (play-beside.R), others are cut into batches and played from R, batch after batch.
+# Episodes of many candidates. Those that the server plays itself are all requested together
+# (play-beside.R); others are divided into batches and played from R, batch after batch.
 #
-# The rule: episodes are taken candidate after candidate. A batch has as many whole candidates as
-# there is room for, and at least one; a candidate with more episodes than that is cut into batches
-# of its own. How much room there is (`batch_size`) depends on the environment: as many episodes as
-# there are sub-environments where these wait for each other, four times as many where each plays on
-# by itself. An environment that remembers something over episodes plays all of them in one batch.
+# The rule: episodes are taken candidate by candidate. A batch has as many whole candidates as fit,
+# and at least one; a candidate with more episodes than that has its own batches. The size of a
+# batch (`batch_size`) depends on the environment: as many episodes as sub-environments if these
+# wait for each other, four times as many if each plays on independently. An environment that
+# remembers something over episodes plays all of them in one batch.
 #
-# So how many cores there are, who plays a batch and how long it takes never decide what is played.
+# So the number of cores, the worker and the time never change the result.
 
 #' Make an empty history of batches
 #'
-#' @param candidates,episodes How many candidates there are, and how many episodes each plays.
-#' @param streams As [new_streams()] makes them.
-#' @param common_seeds Whether all candidates begin their episodes with the same seeds, where each
-#'   episode has a seed of its own.
-#' @return An environment: these, how many episodes were played, `batches`, what [play_batch()]
-#'   returned for each batch, and `draw_seeds`, a function that draws so many seeds of episodes.
+#' @param candidates,episodes The number of candidates, and of episodes of each.
+#' @param streams As made by [new_streams()].
+#' @param common_seeds Whether all candidates use the same seeds for their episodes, if each episode
+#'   has its own seed.
+#' @return An environment: these, the number of episodes played, `batches`, the results of
+#'   [play_batch()], and `draw_seeds`, a function that draws a number of seeds of episodes.
 #' @noRd
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
@@ -28,11 +28,12 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 
 #' Play batches until all episodes have been played
 #'
-#' @param history As [new_history()] returns it. It has the batches that were played also when an
-#'   error or an interrupt ends the playing.
+#' @param history As returned by [new_history()]. After an error or an interrupt it has the batches
+#'   that were played.
 #' @param policy_of A function of the numbers of the candidates of a batch, which returns the policy
 #'   that plays it; `candidate` then counts from 1 in this policy.
-#' @param report A function that is called with how many episodes have ended in the present batch.
+#' @param report A function that is called with the number of finished episodes in the current
+#'   batch.
 #' @param ... Further arguments of [play_batch()].
 #' @param learner As for [play_batch()].
 #' @noRd
@@ -61,12 +62,12 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
       vector_env, batch, policy_of, report, ..., keep_steps = keep_steps, learner = learner,
       max_steps = max_steps
     )
-    # An interrupt finds the batch entered completely, or not at all.
+    # After an interrupt the batch is added completely or not at all.
     suspendInterrupts(enter_batch(history, played))
   }
 }
 
-# Where it is known that no episode ever ends, nothing would come of playing.
+# If no episode ever ends, playing would never return.
 check_has_end <- function(vector_env, max_steps) {
   if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
     gym_abort(
@@ -77,12 +78,12 @@ check_has_end <- function(vector_env, max_steps) {
   }
 }
 
-#' Draw what all batches are played with
+#' Draw what each batch is played with
 #'
-#' What comes of a batch depends on this alone, so that they can be played in any order, as long as
-#' they are entered in theirs.
-#' @return A list with a list for each batch: `episodes`, as [play_batch()] takes them, `each`, how
-#'   many a candidate plays, and `stream`.
+#' The result of a batch depends only on this. Batches can be played in any order, if they are added
+#' in theirs.
+#' @return A list with a list for each batch: `episodes`, as for [play_batch()], `each`, the number
+#'   of episodes of a candidate, and `stream`.
 #' @noRd
 draw_batches <- function(vector_env, history) {
   each <- history$episodes
@@ -95,7 +96,7 @@ draw_batches <- function(vector_env, history) {
   lapply(unname(split(seq_along(episode), batch_numbers(size, candidate, episode))), function(at) {
     n <- length(at)
     seed <- if (one_seed) {
-      # Sub-environments with one generator that begin together share a seed.
+      # Sub-environments with one generator that start together share a seed.
       at_once <- vector_env$num_envs
       rep(draw(ceiling(n / at_once)), each = at_once, length.out = n)
     } else if (is.null(common)) {
@@ -110,7 +111,7 @@ draw_batches <- function(vector_env, history) {
   })
 }
 
-# In which batch each episode is, by the rule above.
+# The batch of each episode, by the rule above.
 batch_numbers <- function(size, candidate, episode) {
   each <- max(episode)
   if (each <= size) {
@@ -120,7 +121,7 @@ batch_numbers <- function(size, candidate, episode) {
   }
 }
 
-# Its policy has its candidates alone.
+# Its policy contains only its candidates.
 play_drawn_batch <- function(vector_env, batch, policy_of, report = function(ended) NULL, ...) {
   play_batch(
     vector_env, policy_of(unique(batch$episodes$candidate)), batch$episodes, batch$stream,
@@ -133,6 +134,6 @@ enter_batch <- function(history, played) {
   history$played_episodes <- history$played_episodes + length(played$episode)
 }
 
-# Whether candidates can play the same episodes: not where R steps sub-environments that share a
-# seed.
+# Whether candidates can play the same episodes. They cannot if R steps sub-environments that share
+# a seed.
 has_common_seeds <- function(vector_env) !vector_env$one_seed || !is.null(vector_env$description)

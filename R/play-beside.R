@@ -1,14 +1,14 @@
 # Episodes that are played beside the environment: the policy is data, and the server's worker
-# processes play whole episodes with it. An episode is a function of environment, policy, seed and
-# `max_steps` alone (in a group also of its row), so that what is asked for together, by whom and
-# how often changes nothing.
+# processes play whole episodes with it. An episode depends only on environment, policy, seed and
+# `max_steps` (in a group also on its row). So the division into requests does not change the
+# result.
 #
-# The episodes are cut into pieces, each of which is a request, or a task for a worker of the plan.
-# Their answers may come in any order; they are entered in that of the episodes.
+# The episodes are divided into pieces, each of which is a request, or a task for a worker of the
+# plan. Answers may come in any order; they are added in the order of the episodes.
 
-#' Choose the way in which a policy plays
+#' Choose how a policy plays
 #'
-#' @param vector_env As [with_vector_env()] gives it.
+#' @param vector_env As passed on by [with_vector_env()].
 #' @param policy The policy, bound to the environment, or several candidates.
 #' @param max_steps,keep_steps As for [play_batch()].
 #' @return The environment that plays: a described one, or one that is stepped from R.
@@ -17,12 +17,12 @@ env_for_policy <- function(vector_env, policy, max_steps = Inf, keep_steps = FAL
   if (plays_beside(vector_env, policy, max_steps, keep_steps)) vector_env else stepped(vector_env)
 }
 
-# The environment that R steps, which is made when it is needed for the first time.
+# The environment that R steps, made on first use.
 stepped <- function(vector_env) {
   if (is.null(vector_env$description)) vector_env else vector_env$make_stepped()
 }
 
-# Where an episode may never end the server plays none without a limit.
+# The server does not play episodes without a limit if they may never end.
 plays_beside <- function(vector_env, policy, max_steps, keep_steps) {
   if (is.null(vector_env$description)) {
     return(FALSE)
@@ -50,16 +50,16 @@ play_beside <- function(vector_env, history, policy_of, report, target = NULL, m
   if (plays_on_workers(vector_env, policy_of, NULL)) play_tasks(play) else play_requests(play)
 }
 
-# How many numbers of policies a request has at most.
+# The most numbers of policies in a request.
 most_numbers <- 1e6
 
-#' List all episodes, candidate after candidate, with their seeds
+#' List all episodes, candidate by candidate, with their seeds
 #'
-#' A group has consecutive episodes, of as many candidates as fit into a request. Candidates that
-#' are to play the same episodes begin a group each.
-#' @param most How many candidates fit into a request.
+#' A group has consecutive episodes, of as many candidates as fit into a request. If candidates play
+#' the same episodes, each starts a group.
+#' @param most The number of candidates that fit into a request.
 #' @return A list of vectors with an element for each episode: `candidate`, `episode`, `seed`,
-#'   `sub_env` and, where episodes are played in groups, `row` (from 0).
+#'   `sub_env` and, if episodes are played in groups, `row` (from 0).
 #' @noRd
 list_episodes <- function(vector_env, history, most) {
   each <- history$episodes
@@ -83,12 +83,12 @@ list_episodes <- function(vector_env, history, most) {
   columns
 }
 
-# What changes while episodes are played: `begins` has the first episode of each unit (a group, or
-# an episode), which no piece divides, and at last the number after all; `next_unit` and `size`, how
-# many units the next piece has; `again`, pieces of which the server left out the end; `pieces`,
-# what was played, by the number of its first episode; `returns` of all episodes; `played` and
-# `entered`, how many were; `needed`, how many are, given the target; `failed`, the first episode
-# that failed, and its error.
+# The state of playing. `begins`: the first episode of each unit (a group, or an episode), which is
+# never divided, and finally the number after all. `next_unit` and `size`: the next piece's first
+# unit and number of units. `again`: pieces whose end the server left out. `pieces`: the results, by
+# the number of the first episode. `returns` of all episodes; `played` and `entered`, their numbers;
+# `needed`, how many are needed, given the target; `failed`, the first episode that failed, and its
+# error.
 new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, most = 1L, each = 1L,
                      target = NULL, report = function(ended) NULL) {
   n <- length(episodes$seed)
@@ -101,9 +101,9 @@ new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, mo
   )
 }
 
-#' Take the next piece that is to be played
-#' @param size How many units it has at most.
-#' @return A list: the numbers of its `first` and `last` episode, and of its `units`. `NULL` when
+#' Take the next piece to play
+#' @param size The largest number of units.
+#' @return A list: the numbers of its `first` and `last` episode, and of its `units`. `NULL` if
 #'   there is none.
 #' @noRd
 take_piece <- function(play, size = play$size) {
@@ -126,11 +126,11 @@ take_piece <- function(play, size = play$size) {
   list(first = begins[[unit]], last = begins[[end]] - 1L, units = end - unit)
 }
 
-#' Note what came of a piece
-#' @param batch As [play_batch()] returns it, for the first episodes of the piece or for all.
-#' @param error What came of the episode after these: `NULL`, or a list like a response, with
+#' Record the results of a piece
+#' @param batch As returned by [play_batch()], for the first episodes of the piece or for all.
+#' @param error The error of the episode after these: `NULL`, or a list like a response, with
 #'   `status_code`, `url` and `answer`.
-#' @return Whether all that is needed has been played.
+#' @return Whether everything that is needed has been played.
 #' @noRd
 take_played <- function(play, piece, batch, error = NULL) {
   n <- length(batch$return)
@@ -157,7 +157,7 @@ enter_in_order <- function(play) {
     if (is.null(batch) || play$entered >= play$needed) break
     wanted <- play$needed - play$entered
     if (length(batch$return) > wanted) {
-      # Where later candidates are left out no steps are kept.
+      # If later candidates are left out, steps are not kept.
       batch <- lapply(batch[names(batch) != "steps"], utils::head, wanted)
     }
     play$enter(batch)
@@ -174,7 +174,7 @@ enter_in_order <- function(play) {
 
 # Tasks for workers --------------------------------------------------------------------------
 
-# A task for a worker is a list of episodes, which it plays on its own server by requests.
+# A worker's task is a list of episodes, which it plays on its own server by requests.
 play_tasks <- function(play) {
   most <- ceiling((length(play$begins) - 1L) / (2 * future::nbrOfWorkers()))
   play$size <- min(most, 16L)
@@ -205,7 +205,7 @@ play_tasks <- function(play) {
   do_tasks(next_task, batch_deadline, play$vector_env$call)
 }
 
-# Its policy has its candidates alone.
+# Its policy contains only its candidates.
 episodes_task <- function(play, piece) {
   vector_env <- play$vector_env
   episodes <- lapply(play$episodes, `[`, piece$first:piece$last)
@@ -217,8 +217,8 @@ episodes_task <- function(play, piece) {
 }
 
 #' Play a list of episodes
-#' @return A list: `batches`, what was played, and `error`, what came of the episode after these,
-#'   see [take_played()].
+#' @return A list: `batches`, the results, and `error`, that of the episode after them, see
+#'   [take_played()].
 #' @noRd
 play_listed_episodes <- function(vector_env, task) {
   batches <- list()

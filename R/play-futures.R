@@ -1,25 +1,24 @@
-# Tasks for the workers of the plan that the user has set with future::plan(). Each task is a future
-# of its own; there are never more than there are free workers. What becomes of a task does not
-# depend on who does it, so that one that was lost is done again, and results are put together in
-# the order of the tasks.
+# Tasks for the workers of the plan set with future::plan(). Each task is a future, and there are
+# never more than free workers. The result of a task does not depend on the worker, so a lost task
+# is done again. Results are put together in the order of the tasks.
 #
-# A worker whose future has failed is left alone: its future is never asked for again, so that
-# future before 1.40 goes on counting the worker as busy, and gives it nothing more. Later versions
-# start another worker in its place.
+# A worker whose future has failed is left alone: its future is never asked for again. future before
+# 1.40 then counts the worker as busy and gives it nothing more. Later versions start another worker
+# in its place.
 
 most_tries <- 3L
 
 #' Do tasks on the workers of the plan
 #'
 #' @param next_task A function that returns the next task, `NULL` after the last one: a list with
-#'   `task`, what is sent, `here`, a function that does it in this session, and `done`, a function
-#'   of its value.
-#' @param deadline A function of the seconds of the slowest task so far, which returns after how
-#'   many a worker counts as lost.
+#'   `task`, the data to send, `here`, a function that does it in this session, and `done`, a
+#'   function of its value.
+#' @param deadline A function of the seconds of the slowest task so far, which returns the seconds
+#'   after which a worker counts as lost.
 #' @param call The call that errors name.
 #' @noRd
 do_tasks <- function(next_task, deadline, call) {
-  # Whether a future is resolved is asked when its worker has something to say: no need to wait.
+  # Futures are checked only when their worker has sent something, so there is no need to wait.
   old <- options(future.resolved.timeout = 0)
   on.exit(options(old))
   crew <- rlang::env(
@@ -40,14 +39,14 @@ do_tasks <- function(next_task, deadline, call) {
   }
 }
 
-# After how many seconds at most the deadlines are looked at, and after how many a future is asked
-# for again that may take as long as it likes.
+# The longest time, in seconds, between two checks of the deadlines, and between two checks of a
+# future without a deadline.
 longest_wait <- 0.5
 longest_wait_without_deadline <- 10
 
-# Waits until a worker has something to say; which ones may have. To ask future for it again and
-# again would take the core that a worker on this machine needs, so the session sleeps on the
-# workers' connections. Now and then all are asked: future may have read an answer by itself.
+# Waits until a worker has sent something and returns the candidates. Polling future would take the
+# core that a local worker needs, so the session sleeps on the workers' connections. Now and then
+# all are checked: future may have read an answer itself.
 await_workers <- function(crew) {
   if (!length(crew$running)) {
     return(integer())
@@ -57,7 +56,7 @@ await_workers <- function(crew) {
   if (any(ready)) which(ready) else seq_along(crew$running)
 }
 
-# `NULL` where a worker has no connection that is known here.
+# `NULL` if a worker's connection is unknown.
 select_workers <- function(running) {
   connections <- lapply(running, function(one) worker_connection(one$future))
   if (!any(vapply(connections, is.null, NA))) {
@@ -65,7 +64,7 @@ select_workers <- function(running) {
   }
 }
 
-# Where it is not known when to ask: a hundredth of the time since the last task was sent.
+# If the connections are unknown: a hundredth of the time since the last task was sent.
 pause_seconds <- function(crew) {
   waited <- proc.time()[["elapsed"]] - max(vapply(crew$running, function(one) one$started, 0))
   has_deadline <- is.finite(crew$deadline(crew$slowest))
@@ -73,13 +72,13 @@ pause_seconds <- function(crew) {
   min(longest, max(0.002, waited / 100))
 }
 
-# Since future 1.40 the workers are those of the future's backend.
+# Since future 1.40 the workers belong to the future's backend.
 worker_node <- function(future) {
   workers <- future$backend$workers %||% future$workers
   if (is.list(workers) && !is.null(future$node)) workers[[future$node]]
 }
 
-# The socket by which a future's worker answers, where it is known.
+# The socket by which a future's worker answers, if it is known.
 worker_connection <- function(future) {
   connection <- worker_node(future)$con
   if (inherits(connection, "sockconn") && is_open(connection)) connection
@@ -89,8 +88,8 @@ is_open <- function(connection) tryCatch(isOpen(connection), error = function(cn
 
 futures_of <- function(crew) lapply(crew$running, function(one) one$future)
 
-# Futures of a call that was interrupted keep their workers busy until somebody takes their values.
-# Those that were cancelled with their plan are not asked for: future would start workers for them.
+# Futures of an interrupted call keep their workers busy until somebody takes their values. Those
+# cancelled with their plan are not taken: future would start workers for them.
 collect_left_futures <- function() {
   the_session$left_futures <- Filter(is_under_way, the_session$left_futures)
 }
@@ -100,7 +99,7 @@ is_under_way <- function(future) {
     !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE))
 }
 
-# The next one: one that was lost, or a new one.
+# The next task: a lost one, or a new one.
 take_task <- function(crew) {
   if (length(crew$again)) {
     one <- crew$again[[1L]]
@@ -138,18 +137,18 @@ launch_tasks <- function(crew) {
 
 free_workers <- function() tryCatch(future::nbrOfFreeWorkers(), error = function(cnd) 0)
 
-# Between batches, when all that are left of the plan's workers are free.
+# Called between batches, when all remaining workers of the plan are free.
 workers_note <- function() {
   if (plan_kind() == "kept") paste0(count_of(free_workers(), "worker"), ", ")
 }
 
-# The first sentence of a message; those of future go on for long.
+# The first sentence of a message; those of future are long.
 first_message_line <- function(cnd) {
   line <- c(strsplit(cnd$message %||% "", "\n", fixed = TRUE)[[1L]], "")[[1L]]
   sub("[.] [A-Z].*", "", line)
 }
 
-# The task travels as bytes, which are read when it is known that the worker has the package.
+# The task is sent as bytes, which are decoded after the worker is known to have the package.
 launch <- function(task) {
   run <- function(bytes) {
     if (!requireNamespace("gym", quietly = TRUE)) {
@@ -164,7 +163,7 @@ launch <- function(task) {
   )
 }
 
-# Takes a task here when there is no worker for it.
+# Does a task in this session if there is no worker for it.
 do_here <- function(crew) {
   if (!crew$broken && crew$slowest == 0 && !length(crew$again)) {
     inform_plays_here("none of them is free, or alive")
@@ -175,7 +174,7 @@ do_here <- function(crew) {
   }
 }
 
-# A task is asked for when it may be `ready`; it is lost when it is not, for too long.
+# Checks a task that may be `ready`. It is lost if it is not ready for too long.
 look_at <- function(crew, number, ready) {
   one <- crew$running[[number]]
   seconds <- proc.time()[["elapsed"]] - one$started
@@ -229,14 +228,14 @@ task_failed <- function(crew, one, state) {
   }
 }
 
-# The host of a future's worker, as far as the plan knows it.
+# The host of a future's worker, if the plan knows it.
 future_host <- function(future) worker_node(future)$host %||% "an unknown host"
 
 warn_of_workers <- function(text, hint = NULL) {
   rlang::warn(c(text, i = hint), class = "gym_warning_worker")
 }
 
-# Results may differ in the last bits where another library of linear algebra calculates.
+# Results may differ in the last bits with another library of linear algebra.
 warn_of_blas <- function(state) {
   own <- extSoftVersion()[["BLAS"]]
   if (!identical(basename(state$BLAS), basename(own)) && is.null(the_session$warned_of_blas)) {

@@ -1,21 +1,22 @@
 #' The return of a policy as a function of its weights
 #'
-#' Makes a function for optimisers such as [stats::optim()], which look for the least value: of a
-#' vector of weights it plays the policy and gives minus its mean return. It plays the same episodes
-#' each time, so that equal weights have equal values.
+#' Make a function for optimisers such as [stats::optim()], which minimise. It plays the policy with
+#' a vector of weights and returns minus its mean return. It plays the same episodes each time, so
+#' equal weights have equal values.
 #'
 #' @inheritParams evaluate_policy
-#' @param policy The policy whose weights are the function's argument: a network, by default
-#'   [policy_linear()]. Moments of observations stay as they are.
-#' @param episodes How many episodes make a mean, a whole number of at least 1; the default is 10.
+#' @param policy The policy whose weights are the argument: a network, by default [policy_linear()].
+#'   Its moments of observations do not change.
+#' @param episodes The number of episodes for a mean, a whole number of at least 1. The default
+#'   is 10.
 #' @param seed A whole number that fixes the episodes. `NULL`, the default, draws one, once.
 #' @return A function of class `gym_objective`. Its argument `weights` is a numeric vector in the
 #'   order of [coef()][coef.gym_policy_network], or a matrix with the weights of a candidate in each
-#'   row, which are played side by side. It returns minus the mean return of each, a numeric vector.
-#'   Its attribute `policy` is the policy, fitted to the environment: `coef(attr(f, "policy"))` are
-#'   weights to begin with.
-#' @section Errors: As those of [rollout()]; from the function `gym_error_argument` when there are
-#'   not as many weights as the policy has.
+#'   row, which are played together. It returns minus the mean return of each, a numeric vector. Its
+#'   attribute `policy` is the policy, bound to the environment: `coef(attr(f, "policy"))` are
+#'   weights to start with.
+#' @section Errors: As for [rollout()]. The function raises a `gym_error_argument` for a wrong
+#'   number of weights.
 #' @seealso [train_agent()], [evaluate_policy()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -57,9 +58,9 @@ gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = N
   structure(objective, policy = policy, class = c("gym_objective", "function"))
 }
 
-# Makes a function that plays the same episodes with each candidate, and returns the mean returns.
-# Nothing is drawn there: optim(method = "SANN") draws in C, and goes on with what drawing in the
-# function that it calls leaves behind, the same each time.
+# Returns a function that plays the same episodes with each candidate and returns the mean returns.
+# It must not draw random numbers: optim(method = "SANN") draws in C and would go on from the same
+# state each time.
 same_episodes <- function(seed, episodes, max_steps) {
   streams <- new_streams(seed)
   seeds <- with_generator(streams$seeds, draw_environment_seeds(episodes))
@@ -79,7 +80,7 @@ same_episodes <- function(seed, episodes, max_steps) {
     colMeans(matrix(returns, episodes))
   }
   function(vector_env, candidates, count) {
-    # Where R steps sub-environments that share a seed, a candidate beside others would play other
+    # If R steps sub-environments that share a seed, candidates played together would play different
     # episodes.
     if (has_common_seeds(env_for_policy(vector_env, candidates, max_steps %||% Inf))) {
       play(vector_env, candidates, seq_len(count))

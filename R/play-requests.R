@@ -1,11 +1,11 @@
-# Asking a server for episodes: what a request says, and what its answer has.
+# Request episodes from a server and read its answers.
 
-# How long a request is to take, in seconds: so often there is progress, and an interrupt waits no
-# longer than the server.
+# The intended time of a request, in seconds: progress is shown this often, and an interrupt waits
+# at most this long for the server.
 request_seconds <- 0.25
 
-#' Play by requests, two of which are under way
-#' @param play As [new_play()] returns it.
+#' Play by requests, two at a time
+#' @param play As returned by [new_play()].
 #' @noRd
 play_requests <- function(play) {
   vector_env <- play$vector_env
@@ -35,14 +35,13 @@ play_requests <- function(play) {
   )
 }
 
-# How many units the first piece has: what took so long the last time may take longer with another
-# policy.
+# The number of units of the first piece. A unit may take longer than last time with another policy.
 first_size <- function(play) {
   least <- if (is.null(play$episodes$row)) play$vector_env$description$processes else 1L
   max(least, (play$vector_env$known$size %||% 0L) %/% 2L)
 }
 
-# How many units the next piece has, so that it takes so many seconds.
+# The number of units of the next piece, chosen so that it takes so many seconds.
 next_size <- function(units, seconds, wanted) {
   as.integer(max(1, min(8 * units, units * wanted / max(seconds, 0.001), 2^20)))
 }
@@ -83,9 +82,9 @@ data_tensor <- function(values, dtype) {
 
 # Answers ------------------------------------------------------------------------------------
 
-#' Read what came of a piece
-#' @return A list: `batch`, as [play_batch()] returns it, and `error`, what came of the episode
-#'   after those of the batch, see [take_played()].
+#' Read the answer to a piece
+#' @return A list: `batch`, as returned by [play_batch()], and `error`, that of the episode after
+#'   those of the batch, see [take_played()].
 #' @noRd
 read_played <- function(play, piece, response) {
   call <- play$vector_env$call
@@ -143,7 +142,7 @@ read_moments <- function(tensors, n) {
   lapply(seq_len(n), function(i) new_moments(count[[i]], mean[i, ], squares[i, ]))
 }
 
-# All steps of some episodes, as play_batch() keeps those that were taken together.
+# The steps of some episodes, in the form in which play_batch() keeps those taken together.
 read_steps <- function(play, lengths, answer) {
   vector_env <- play$vector_env
   n <- sum(lengths)

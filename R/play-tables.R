@@ -1,7 +1,7 @@
 # The tables of a rollout: a row for each episode, a row for each step.
 
 #' Put the episodes of batches into a table
-#' @param several Whether there are several candidates, so that a column tells them apart.
+#' @param several Whether there are several candidates, which need a column.
 #' @noRd
 episodes_table <- function(batches, several = FALSE) {
   column <- function(name, type) {
@@ -22,7 +22,7 @@ episodes_table <- function(batches, several = FALSE) {
 
 #' Put the steps of batches into a table, episode after episode
 #' @param episodes The table of their episodes.
-#' @param next_observation Whether the table has the observation after each step, too.
+#' @param next_observation Whether to include the observation after each step.
 #' @noRd
 steps_table <- function(batches, episodes, vector_env, several = FALSE, next_observation = FALSE) {
   steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
@@ -42,7 +42,7 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
       stats::setNames(after, paste0("next_", names(after)))
     }
   )
-  # Stable, so that an episode's steps stay in their order.
+  # Stable sorting keeps the steps of an episode in order.
   by_episode <- order(step_rows(batches), method = "radix")
   columns <- lapply(columns, `[`, by_episode)
   columns$truncated[cumsum(episodes$length)] <- episodes$truncated
@@ -54,8 +54,7 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
   data.frame(c(keys[lengths(keys) > 0L], columns), check.names = FALSE)
 }
 
-# For each step, in the order in which they were played, the row of its episode in the table of
-# episodes.
+# The row of its episode in the table of episodes, for each step in the order of play.
 step_rows <- function(batches) {
   before <- c(0L, cumsum(vapply(batches, function(batch) length(batch$episode), 0L)))
   unlist(lapply(seq_along(batches), function(i) {

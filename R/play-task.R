@@ -1,15 +1,15 @@
-# What a worker does: a task is what it is given, in one message, and depends on nothing else.
+# The worker's part: a task arrives in one message and depends on nothing else.
 #
-# A worker keeps its vector environments between tasks, on a server of its own, which ends with it.
+# A worker keeps its vector environments between tasks, on its own server, which ends with it.
 
 the_worker <- new.env(parent = emptyenv())
 the_worker$kept <- list()
 most_kept <- 4L
 
-#' What can be sent to a worker so that it makes the same environment
+#' Describe an environment so that a worker can make the same one
 #'
 #' @param arguments The further arguments of [as_vector_env()].
-#' @return A list; or a string that says why the environment cannot travel.
+#' @return A list; or a string with the reason why the environment cannot be sent.
 #' @noRd
 environment_recipe <- function(env, vector_env, arguments) {
   if (length(vector_env$remembers)) {
@@ -39,7 +39,7 @@ environment_recipe <- function(env, vector_env, arguments) {
 
 #' Make a task
 #'
-#' @param kind What [run_task()] has a method for.
+#' @param kind A kind that [run_task()] has a method for.
 #' @param versions Those of the server.
 #' @noRd
 new_worker_task <- function(kind, recipe, versions, ...) {
@@ -51,7 +51,7 @@ new_worker_task <- function(kind, recipe, versions, ...) {
 
 #' Do a task
 #'
-#' @param task As [new_worker_task()] makes it.
+#' @param task As made by [new_worker_task()].
 #' @return A list: `value`, or `error` and whether the same task may succeed elsewhere (`lost`);
 #'   `host`, `pid`, `seconds`, `BLAS`.
 #' @noRd
@@ -61,7 +61,8 @@ do_task <- function(task) {
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
       the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
-      # As many processes as future gives the worker play beside the environment: normally one.
+      # As many processes play beside the environment as future gives the worker cores: normally
+      # one.
       the_session$server_options$max_rollout_processes <- parallelly::availableCores()[[1L]]
       with_own_server(list(value = run_task(task)))
     },
@@ -96,7 +97,7 @@ check_worker_gymnasium <- function(task, client) {
   }
 }
 
-# A forked child has a server of its own as well, which must not outlive it.
+# A forked child has its own server, too, which must not outlive it.
 with_own_server <- function(code) {
   if (Sys.getpid() != the_session$pid) {
     parent <- mget(c("pid", "client", "servers"), the_session)
@@ -111,7 +112,7 @@ with_own_server <- function(code) {
   code
 }
 
-# What is done with a task of its class, given that the worker has the right package.
+# Does a task by its class. The worker has the right package.
 run_task <- function(task) UseMethod("run_task")
 
 #' @exportS3Method
@@ -119,7 +120,7 @@ run_task.gym_task_batch <- function(task) {
   rlang::exec(play_batch, kept_vector_env(task), !!!task$part)
 }
 
-# The worker's vector environment of a recipe, which is made when it is needed for the first time.
+# The worker's vector environment for a recipe, made on first use.
 kept_vector_env <- function(task) {
   recipe <- task$recipe
   key <- rlang::hash(list(recipe, task$num_envs))

@@ -1,19 +1,19 @@
-# What everything that plays does first and last: it takes a vector environment, and gives it back.
+# The first and last part of everything that plays: get a vector environment and give it back.
 
 #' Call a function with the vector environment of an environment
 #'
-#' What was made for it is closed when `use` has returned.
-#' @param episodes How many episodes are played at most.
+#' A vector environment that was made for this is closed when `use` returns.
+#' @param episodes The largest number of episodes.
 #' @param use A function of the vector environment.
-#' @param max_steps As given by the user, who is told when the environment's own limit is smaller.
+#' @param max_steps The user's value. A smaller limit of the environment gives a warning.
 #' @param ... Further arguments of [as_vector_env()].
-#' @param client As given by the user. Its default starts a server, so it is only passed on: a
-#'   method for an environment that needs no server never evaluates it.
-#' @param seed What a random map is drawn from, see [with_random_map()].
+#' @param client The user's client. Its default starts a server, so it is only passed on: a method
+#'   for an environment without a server never evaluates it.
+#' @param seed The seed of a random map, see [with_random_map()].
 #' @noRd
 with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = gym_client(),
                             seed = NULL, call = rlang::caller_env()) {
-  # Errors from making the environment name the user's call, too.
+  # Errors from making the environment should name the user's call, too.
   rlang::local_error_call(call)
   arguments <- with_random_map(env, list(...), seed)
   made <- NULL
@@ -49,7 +49,7 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = 
   value
 }
 
-# What was given for sub-environments is none of the environment's own arguments.
+# Arguments about sub-environments are not arguments of the environment.
 describe_to_play <- function(env, arguments, client, call) {
   of_sub_envs <- rlang::names2(arguments) %in% c("num_envs", "num_workers", "frames")
   given <- arguments[of_sub_envs]
@@ -62,7 +62,7 @@ describe_to_play <- function(env, arguments, client, call) {
   described
 }
 
-# `max_steps` cannot lift the environment's own limit.
+# `max_steps` cannot extend the environment's own limit.
 warn_of_own_limit <- function(max_steps, vector_env, call) {
   own <- vector_env$spec$max_episode_steps
   if (!is.null(max_steps) && !is.null(own) && own < max_steps) {
@@ -78,7 +78,7 @@ warn_of_own_limit <- function(max_steps, vector_env, call) {
   }
 }
 
-# Only where it was decided here to play one episode after the other.
+# Only if it was decided here to play one episode after the other.
 inform_of_memory <- function(vector_env, env) {
   if (length(vector_env$remembers) && (is.character(env) || inherits(env, "gym_wrapped"))) {
     rlang::inform(
@@ -103,9 +103,8 @@ inform_calls_r <- function(vector_env) {
 #' Play until the end or an interrupt
 #'
 #' @param play Code that plays.
-#' @param text A message for an interrupt, for cli, with `{finished}` and, where it is given,
-#'   `{total}`.
-#' @param count_finished A function that returns how many are finished, or a text that says it.
+#' @param text A message for an interrupt, for cli, with `{finished}` and, if given, `{total}`.
+#' @param count_finished A function that returns the number of finished ones, or a text.
 #' @return Whether there was an interrupt, logical.
 #' @noRd
 until_interrupted <- function(play, text, count_finished, total = NULL) {
@@ -124,11 +123,11 @@ until_interrupted <- function(play, text, count_finished, total = NULL) {
 
 #' Show a progress bar until the calling function ends
 #'
-#' Where the package progressr is loaded its handlers are told as well, by whom they were asked for.
-#' @param unit What is counted, a word such as `"Round"`.
-#' @param note What stands before the time that is left.
-#' @param shown Whether there is a bar.
-#' @return A function of how many are finished and the new `note`.
+#' If the package progressr is loaded, its handlers are informed, too.
+#' @param unit The unit, a word such as `"Round"`.
+#' @param note The text before the remaining time.
+#' @param shown Whether to show the bar.
+#' @return A function of the number of finished units and the new `note`.
 #' @noRd
 progress_bar <- function(total, unit, note = "", shown = TRUE, frame = parent.frame()) {
   bar <- if (shown) cli_bar(total, unit, note, frame) else function(finished, note) NULL
@@ -151,7 +150,7 @@ cli_bar <- function(total, unit, note, frame) {
   )
   shown <- 0
   function(finished, note) {
-    # A bar that has come to its end is gone.
+    # A finished bar no longer exists.
     if (shown < total) {
       shown <<- finished
       cli::cli_progress_update(
@@ -161,7 +160,7 @@ cli_bar <- function(total, unit, note, frame) {
   }
 }
 
-# At most a hundred signals, each of which takes a while.
+# At most a hundred signals, because each takes a while.
 progress_signal <- function(total, frame) {
   if (!"progressr" %in% loadedNamespaces()) {
     return(function(finished, note) NULL)
@@ -176,8 +175,8 @@ progress_signal <- function(total, frame) {
   }
 }
 
-# The error keeps the classes and fields of the one in the middle: code that expects a lost
-# connection need not know that it was lost while episodes were played.
+# The error keeps the classes and fields of the original one: code that expects a lost connection
+# need not know that it was lost during play.
 abort_with_result <- function(cnd, what, result, played, class, call, hint = NULL) {
   own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
            "use_cli_format")

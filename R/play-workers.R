@@ -1,53 +1,50 @@
-# Playing on the workers of the plan that the user has set with future::plan(): whether it can be
-# done, and what becomes of a batch that is played from R, which is a task (play-futures.R). What is
-# played beside the environment travels as lists of episodes (play-beside.R).
+# Playing on the workers of the plan set with future::plan(): whether it is possible, and how a
+# batch that R plays becomes a task (play-futures.R). Play beside the environment is sent as lists
+# of episodes (play-beside.R).
 
 #' Play on many cores and machines
 #'
-#' Where the user has set a plan of the package future, such as
-#' `future::plan(future::multisession, workers = 8)` or
-#' `future::plan(future::cluster, workers = c("host1", "host2"))`, its workers play the episodes of
-#' [rollout()], [evaluate_policy()], [search_random()] and the other searches, [train_agent()],
-#' [search_landscape()] and [gym_objective()]; `train_agent(seeds = )` gives each of them whole
-#' trainings. Nothing else needs to be said, and nothing changes without a plan.
+#' Set a plan of the package future, such as `future::plan(future::multisession, workers = 8)` or
+#' `future::plan(future::cluster, workers = c("host1", "host2"))`. Its workers then play the
+#' episodes of [rollout()], [evaluate_policy()], [search_random()] and the other searches,
+#' [train_agent()], [search_landscape()] and [gym_objective()]. `train_agent(seeds = )` gives each
+#' worker whole trainings. You need not change any call, and nothing changes without a plan.
 #'
-#' Results do not depend on the plan, to the last bit: what a worker is given is a list of episodes,
-#' or a batch of them where R plays step by step (see [rollout()]), and what comes of these does not
-#' depend on who plays them. On another kind of machine the library of linear algebra, NumPy or the
-#' processor may make a difference in the last bits; [provenance()] names them, and a library that
-#' differs is warned of.
+#' Results do not depend on the plan, to the last bit. A worker gets a list of episodes, or a batch
+#' of them if R plays step by step (see [rollout()]), and their results do not depend on who plays
+#' them. On another kind of machine the library of linear algebra, NumPy or the processor may change
+#' the last bits. [provenance()] names them, and a different library gives a warning.
 #'
-#' Each worker plays on a server of its own, which it starts when it is first needed, keeps, and
-#' ends when it ends itself; the variable `GYM_SERVER_URL` on the worker, with the token's variable,
-#' names another one (see [gym_client()]). So that cores are not used twice, that server plays
-#' episodes in as many processes as future gives the worker cores, normally one; and where R plays
-#' step by step it runs the sub-environments in its own process, unless `num_workers` asks for more.
+#' Each worker plays on its own server, which it starts on first use and stops when it ends. The
+#' variable `GYM_SERVER_URL` on the worker, with the token's variable, selects another one (see
+#' [gym_client()]). To avoid overloading the cores, that server plays episodes in as many processes
+#' as future gives the worker cores, normally one. In step-by-step play it runs the sub-environments
+#' in its own process, unless `num_workers` asks for more.
 #'
-#' What cannot be sent is played in the session, which is said once: an environment that was given
-#' as an object, or by a client other than the session's own; wrappers that remember something over
-#' episodes; episodes whose frames are kept; agents that learn from each step; a policy with a
-#' connection or a pointer. Plans whose workers end after each future (`multicore`, those of
-#' batchtools) train whole seeds only.
+#' The session itself plays what it cannot send, and says so once: an environment given as an
+#' object, or by a client other than the session's own; wrappers that remember something over
+#' episodes; episodes with frames; agents that learn from each step; a policy with a connection or a
+#' pointer. Plans whose workers end after each future (`multicore`, those of batchtools) train whole
+#' seeds only.
 #'
-#' Where the package progressr is loaded its handlers are told of the progress.
+#' If the package progressr is loaded, its handlers show the progress.
 #'
-#' Set `options(socketOptions = "no-delay")` before the plan, above all where a batch takes less
-#' than a second: without it, R waits some 40 ms for an acknowledgement in the middle of every
-#' message to a worker that has more than a few thousand bytes.
+#' Set `options(socketOptions = "no-delay")` before the plan, especially if a batch takes less than
+#' a second. Otherwise R waits some 40 ms for an acknowledgement in each message to a worker that
+#' has more than a few thousand bytes.
 #'
-#' @section A worker that is lost:
-#' When a worker dies, its server fails, or it is silent for longer than the option
-#' `gym.batch_deadline` (seconds; by default ten times as long as the slowest part of a batch so
-#' far, and at least 60), its part is played by another one, with a warning of class
-#' `gym_warning_worker` that names the host; the third time the session plays it. When the plan
-#' takes no more futures the session plays on by itself; `future::plan("sequential")` and then a
-#' plan with new workers end that. Since version 1.40 the package future starts another worker in
-#' the place of one that died, where it can. The result is the same in all cases. A training of a
-#' seed has no deadline.
+#' @section If a worker is lost:
+#' A worker is lost if it dies, its server fails, or it is silent for longer than the option
+#' `gym.batch_deadline` (in seconds; by default ten times the slowest part of a batch so far, and at
+#' least 60). Another worker then plays its part, with a warning of class `gym_warning_worker` that
+#' names the host. The third time the session plays it. If the plan accepts no more futures, the
+#' session continues alone; set `future::plan("sequential")` and then a plan with new workers to
+#' change that. Since version 1.40 the package future replaces a dead worker if it can. The result
+#' is the same in all cases. The training of a seed has no deadline.
 #'
-#' @section Errors: `gym_error_worker` where a worker lacks the package, or has another version of
-#'   it or of Gymnasium; the element `host` names the worker's machine. An error on a worker is the
-#'   call's own error, with the element `host`.
+#' @section Errors: `gym_error_worker` if a worker lacks the package, or has another version of it
+#'   or of Gymnasium; the field `host` names the worker's machine. An error on a worker is the
+#'   call's own error, with the field `host`.
 #' @references H. Bengtsson (2021): A Unifying Framework for Parallel and Distributed Processing in
 #'   R using Futures. The R Journal 13(2), <https://doi.org/10.32614/RJ-2021-048>.
 #' @seealso `vignette("scaling")`; `system.file("examples/slurm.R", package = "gym")`, for a cluster
@@ -59,8 +56,8 @@
 #' future::plan(future::sequential)
 NULL
 
-# Whether tasks can go to the workers of the plan: "none" without a plan, "kept" where a worker
-# lives on between futures, "short" where each future has a process of its own.
+# Whether the plan's workers accept tasks: "none" without a plan, "kept" if a worker lives on
+# between futures, "short" if each future has its own process.
 plan_kind <- function() {
   if (!"future" %in% loadedNamespaces()) {
     return("none")
@@ -77,8 +74,8 @@ plan_kind <- function() {
   }
 }
 
-# Which workers the plan has: the same call of plan() may have started new ones. Since future 1.40
-# a plan has a backend with an id of its own.
+# The workers of the plan: the same call of plan() may have started new ones. Since future 1.40 a
+# plan has a backend with its own id.
 plan_workers <- function() {
   plan <- future::plan("next")
   backend <- attr(plan, "backend", exact = TRUE)
@@ -101,7 +98,7 @@ inform_plays_here <- function(reason, hint = NULL) {
   )
 }
 
-# Does something refer to a connection, a pointer or anything else that only this process has?
+# Does an object refer to a connection, a pointer or anything else that only this process has?
 refers_to_process <- function(x) {
   found <- FALSE
   serialize(x, NULL, refhook = function(part) {
@@ -115,7 +112,7 @@ inform_learner_plays_here <- function() {
   inform_plays_here("a learner learns from each step before it takes the next one")
 }
 
-# Can batches go to workers? Says why not where there are some.
+# Can batches go to workers? If there are workers and it cannot, says why.
 plays_on_workers <- function(vector_env, policy_of, learner) {
   kind <- plan_kind()
   if (kind == "none") {
@@ -142,8 +139,8 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
 
 #' Play all batches on workers
 #'
-#' A task is a batch. They are entered in their order.
-#' @param batches As [draw_batches()] returns them.
+#' Each batch is a task. Results are added in the order of the batches.
+#' @param batches As returned by [draw_batches()].
 #' @inheritParams play_batches
 #' @noRd
 play_in_futures <- function(vector_env, batches, history, policy_of, report, ...) {
@@ -177,7 +174,7 @@ play_in_futures <- function(vector_env, batches, history, policy_of, report, ...
   do_tasks(next_task, batch_deadline, vector_env$call)
 }
 
-# The policy of a batch has its candidates alone.
+# The policy of a batch contains only its candidates.
 batch_task <- function(vector_env, batch, policy_of, arguments) {
   recipe <- vector_env$recipe
   recipe$one_seed <- vector_env$one_seed
@@ -190,7 +187,7 @@ batch_task <- function(vector_env, batch, policy_of, arguments) {
   )
 }
 
-# After how many seconds a worker that plays a task counts as lost.
+# The seconds after which a worker with a task counts as lost.
 batch_deadline <- function(slowest) {
   getOption("gym.batch_deadline") %||% max(60, 10 * slowest)
 }
