@@ -185,7 +185,7 @@ dqn_update <- function(policy, state, rows, settings) {
   error <- outputs[taken] - wanted
   # Huber's loss: the slope of the squared error up to 1, constant beyond it.
   slopes <- matrix(0, nrow(outputs), n)
-  slopes[taken] <- pmax(-1, pmin(error, 1)) / n
+  slopes[taken] <- pmax.int(-1, pmin.int(error, 1)) / n
   gradient <- clip_norm(backward_network(forward, slopes), settings$max_grad_norm)
   moved <- adam_step(state$weights, gradient, state$adam, settings$learning_rate)
   size <- abs(error)

@@ -215,8 +215,8 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   # clip, in the direction of the advantage, it has no slope.
   log_ratio <- both$draws$log_prob - batch$log_prob
   ratio <- exp(log_ratio)
-  clipped <- pmin(pmax(ratio, 1 - settings$clip), 1 + settings$clip)
-  objective <- pmin(ratio * advantage, clipped * advantage)
+  clipped <- pmin.int(pmax.int(ratio, 1 - settings$clip), 1 + settings$clip)
+  objective <- pmin.int(ratio * advantage, clipped * advantage)
   counts <- (advantage >= 0 & ratio <= 1 + settings$clip) |
     (advantage < 0 & ratio >= 1 - settings$clip)
   slopes <- log_prob_slopes(
@@ -240,7 +240,8 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
 ppo_forward <- function(policy, value, weights, inputs, action) {
   count <- count_weights(policy)
   of_policy <- forward_network(policy, weights, inputs)
-  of_value <- forward_network(value, weights[-seq_len(count)], inputs)
+  # Negative numbers, for all but the policy's, take four times as long.
+  of_value <- forward_network(value, weights[(count + 1L):length(weights)], inputs)
   outputs <- of_policy$outputs
   log_std <- if (is_gaussian(policy)) weights[(count - length(policy$log_std) + 1L):count]
   list(

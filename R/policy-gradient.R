@@ -134,7 +134,7 @@ log_prob_slopes <- function(policy, parts, weights, of_entropy = 0) {
 
 column_max <- function(x) {
   largest <- x[1L, ]
-  for (row in seq_len(nrow(x))[-1L]) largest <- pmax(largest, x[row, ])
+  for (row in seq_len(nrow(x))[-1L]) largest <- pmax.int(largest, x[row, ])
   largest
 }
 
