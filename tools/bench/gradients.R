@@ -7,9 +7,9 @@
 #   python3 -m venv sb3 && sb3/bin/pip install stable-baselines3 'gymnasium[box2d]'
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS=gradients
 #
-# All of it takes hours. An environment's id among PARTS measures that one alone, turns=N and seeds=N
-# measure less, and the rows of what is not measured stay in the file: so do those by R's reference
-# BLAS beside those by another one (LD_PRELOAD=/usr/lib/.../libopenblas.so.0 is enough to change it).
+# All of it takes hours. An environment's id among PARTS measures that one alone, turns=N and
+# seeds=N measure less, and the rows of what is not measured stay in the file: so do those by R's
+# reference BLAS beside those by OpenBLAS (LD_PRELOAD=/usr/lib/.../libopenblas.so.0 changes it).
 #
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS='gradients LunarLander-v3 turns=5 seeds=0'
 
