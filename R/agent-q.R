@@ -110,11 +110,14 @@ learner_of.gym_agent_q <- function(agent) {
   learn <- learning$learn
   taken <- agent$taken
   memory <- if (agent$planning > 0L) new_planning_memory(agent, learning$store)
+  # A step then changes values of the state alone that it was taken in.
+  own_row <- identical(agent$basis$each, 1L) && is.null(memory)
   new_steps(
     agent, learning,
     begin = function(x, sub_env, observation) choose(row(x), taken),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
-      ahead <- if (terminated) 0 else max(row(after))
+      values <- row(after)
+      ahead <- if (terminated) 0 else max(values)
       learn(x, column, reward, ahead, ended, sub_env, taken)
       taken <<- taken + 1
       if (!is.null(memory)) {
@@ -122,7 +125,9 @@ learner_of.gym_agent_q <- function(agent) {
         # Planned steps are not steps of the environment: schedules do not advance.
         memory$plan(taken)
       }
-      if (ended) NA_integer_ else choose(row(after), taken)
+      if (ended) return(NA_integer_)
+      if (!own_row || x == after) values <- row(after)
+      choose(values, taken)
     },
     export = function(agent) {
       agent$taken <- taken

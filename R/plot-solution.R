@@ -51,7 +51,7 @@ autoplot.gym_solution <- function(object, ..., type = c("values", "q"), columns 
   check_dots_empty(...)
   type <- check_choice(type[1L], c("values", "q"), arg = "type")
   data <- solution_plot_data(object, columns, directions, passenger, destination, step)
-  data$q <- q_of_cells(object, data)
+  data$q <- q_of_cells(object$q, state_numbers(object$model$observation_space), data)
   picture <- if (is.null(data$columns)) {
     if (type == "q") q_points(data) else value_points(data)
   } else {
@@ -135,11 +135,10 @@ end_kinds <- function(model, kinds) {
   ifelse(is.na(reward), "", ifelse(reward >= least, "goal", "pit"))
 }
 
-# The value of each action in each cell in which episodes go on.
-q_of_cells <- function(x, data) {
+# The value of each action in each cell where episodes go on.
+q_of_cells <- function(q, states, data) {
   cells <- data$cells[!is.na(data$cells$value), ]
-  rows <- match(cells$state, state_numbers(x$model$observation_space))
-  q <- x$q[rows, , drop = FALSE]
+  q <- q[match(cells$state, states), , drop = FALSE]
   each <- data.frame(
     cells[
       rep(seq_len(nrow(cells)), ncol(q)), intersect(c("state", "row", "column"), names(cells)),

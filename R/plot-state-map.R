@@ -4,6 +4,10 @@
 #' are FrozenLake, CliffWalking, Taxi (for one passenger and destination) and any other grid whose
 #' `columns` you give. Otherwise each state has a point.
 #'
+#' With `type = "q"` it shows the values of all actions instead, if the policy is a table of values:
+#' a triangle for each direction, as in [plot.gym_solution()]. A state is empty if all its actions
+#' have the same value, as in a state that was never left.
+#'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
 #'
@@ -12,18 +16,26 @@
 #' @param columns The number of columns of the grid, whose states are numbered row by row from the
 #'   upper left. `NULL`, the default, for a known environment: 12 for CliffWalking, and as many as
 #'   rows for FrozenLake.
+#' @param type What to show, a string: `"actions"`, the default, or `"q"`, the values of all actions.
 #' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if `type` is `"q"` and the policy is no table.
 #' @rdname plot.gym_state_map
 #' @exportS3Method ggplot2::autoplot
 #' @examples
 #' right <- policy_table(matrix(c(0, 0, 1, 0), 16, 4, byrow = TRUE))
 #' @examplesIf gym:::can_start_server()
 #' plot(decision_map("FrozenLake-v1", right))
-autoplot.gym_state_map <- function(object, ..., columns = NULL, directions = NULL, passenger = 2,
-                                   destination = 0) {
+#' learned <- learn_q("FrozenLake-v1", total_steps = 20000, is_slippery = FALSE, seed = 1)
+#' plot(decision_map("FrozenLake-v1", learned$policy), type = "q")
+autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), columns = NULL,
+                                   directions = NULL, passenger = 2, destination = 0) {
   check_dots_empty(...)
+  type <- check_choice(type[1L], c("actions", "q"), arg = "type")
   data <- state_map_data(object, columns, directions, passenger, destination)
-  picture <- if (is.null(data$columns)) {
+  if (type == "q") data$q <- q_of_table(object, data)
+  picture <- if (type == "q") {
+    if (is.null(data$columns)) q_points(data) else grid_picture(data, q_layers(data))
+  } else if (is.null(data$columns)) {
     ggplot2::ggplot(data$cells, ggplot2::aes(.data$state, .data$does)) +
       ggplot2::geom_point(colour = gym_colours[["blue"]]) +
       ggplot2::scale_x_continuous(breaks = few_breaks) +
@@ -41,10 +53,23 @@ autoplot.gym_state_map <- function(object, ..., columns = NULL, directions = NUL
       action_layers(data, data$cells)
     ))
   }
+  shown <- if (type == "q") "values of actions" else policy_subtitle(object)
   picture +
-    picture_labels(
-      object$env_id %||% "Decision map", c(policy_subtitle(object), taxi_subtitle(data)), width = 40
+    picture_labels(object$env_id %||% "Decision map", c(shown, taxi_subtitle(data)), width = 40)
+}
+
+q_of_table <- function(x, data, call = rlang::caller_env()) {
+  if (!inherits(x$policy, "gym_policy_table")) {
+    gym_abort(
+      paste0("Values of actions are those of a `policy_table()`, not of ",
+             describe_argument(x$policy), "."),
+      class = "gym_error_argument", argument = "type", value = x$policy, call = call
     )
+  }
+  q <- x$policy$q
+  differs <- row_max(q) > -row_max(-q)
+  data$cells$value <- ifelse(differs[match(data$cells$state, x$grid$state)], 0, NA)
+  q_of_cells(q, x$grid$state, data)
 }
 
 #' Compute the data of a map of states
@@ -73,5 +98,6 @@ state_map_data <- function(x, columns, directions, passenger, destination,
     own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
     grid_cells(cells, columns %||% own, call)
   }
-  c(placed, list(colours = stats::setNames(action_colours(length(labels)), labels)))
+  colours <- stats::setNames(action_colours(length(labels)), labels)
+  c(placed, list(directions = directions, colours = colours))
 }

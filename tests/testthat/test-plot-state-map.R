@@ -36,6 +36,28 @@ test_that("it is drawn on the known grids and on given ones, and otherwise as po
   expect_error(plot(own, columns = 3), "make whole rows", class = "gym_error_argument")
 })
 
+test_that("the values of a learned table are triangles on the grid, or points", {
+  map <- function(policy) decision_map(lake_like(2L, "Own-v0"), policy)
+  q <- matrix(0, 16, 2)
+  q[1, ] <- c(0.25, 0.5)
+  q[6, ] <- c(0.75, -Inf)
+  picture <- autoplot(map(policy_table(q)), type = "q", columns = 4,
+                      directions = c("left", "right"))
+  shown <- layers_of(drawn(picture), "GeomText")
+  shown <- do.call(rbind, lapply(shown, function(layer) layer[c("label", "x", "y", "fontface")]))
+  # Only of states that were left; what cannot be taken has no triangle.
+  expect_setequal(shown$label, c("0.25", "0.50", "0.75"))
+  expect_identical(shown$fontface[match(c("0.25", "0.50"), shown$label)], c("plain", "bold"))
+  expect_lt(shown$x[shown$label == "0.25"], 1)
+  expect_gt(shown$x[shown$label == "0.50"], 1)
+  points <- drawn(autoplot(map(policy_table(q)), type = "q"))
+  expect_identical(nrow(layers_of(points, "GeomPoint")[[1]]), 3L)
+  expect_error(
+    plot(map(function(state) state %% 2L), type = "q"), "not of a function",
+    class = "gym_error_argument"
+  )
+})
+
 test_that("Taxi has a grid for each passenger and destination", {
   taxi <- fake_environment(observation_space = discrete_space(500L),
                            action_space = discrete_space(6L), id = "Taxi-v4")
