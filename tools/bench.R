@@ -8,7 +8,7 @@
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
-#   [beside] [wire] [memory] runs parts.
+#   [beside] [wire] [memory] [tables] runs parts.
 #
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
 #                                vignettes/bench-gradients.csv and vignettes/bench-gradients.md.
@@ -17,8 +17,8 @@
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
-               "rollouts", "beside", "wire", "gradients", "results", "goals", "table", "figure",
-               "figure-environments")) {
+               "rollouts", "beside", "wire", "gradients", "tables", "results", "goals", "table",
+               "figure", "figure-environments")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
 source("vignettes/pictures.R")
@@ -64,13 +64,14 @@ bench <- function(parts, quick) {
     if ("gradients" %in% parts) {
       compare_gradients(python, utils::modifyList(scale, gradient_scale))
     },
+    if ("tables" %in% parts) compare_tables(python, scale$rollout_turns, scale$fresh),
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
   list(rows = rows, run = c(describe_run(setup, parts), took = paste(round(now() - started), "s")))
 }
 
 set_up <- function(python, parts) {
-  if (identical(parts, "gradients")) {
+  if (all(parts %in% c("gradients", "tables"))) {
     return(list(python = start_python(python)))
   }
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
@@ -140,7 +141,7 @@ report <- function(result, csv, text, figure, environments) {
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
 all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
-               "memory")
+               "memory", "tables")
 parts <- intersect(c(all_parts, "gradients"), arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts

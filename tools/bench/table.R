@@ -14,7 +14,7 @@ what_text <- function(summary) {
     summary$num_envs > 0, sprintf("%.0f sub-environment%s", summary$num_envs, plural),
     words[summary$part]
   )
-  ifelse(summary$part %in% c("env_rollouts", "gradients"), summary$env_id, text)
+  ifelse(summary$part %in% c("env_rollouts", "gradients", "tables"), summary$env_id, text)
 }
 
 # The parts of a run, each group a table of its own.
@@ -22,7 +22,8 @@ table_groups <- list(
   CartPole = c("single", "vector", "r_env", "search", "fresh", "memory"),
   environments = c("env_rollouts", "candidates", "beside"),
   step = "wire",
-  gradients = "gradients"
+  gradients = "gradients",
+  tables = "tables"
 )
 
 # A table for each group that was measured, with an empty line after it.
