@@ -1,8 +1,8 @@
-# Wrappers that call a function of the user's in each step, with the names of Gymnasium's. The
-# function gets batches, whatever is wrapped: a single environment has a batch of one. They go
-# around environments in R (env-r-wrappers.R) and around those of a server (env-wrapped-server.R).
+# Wrappers that call a user's function in each step, named as in Gymnasium. The function gets
+# batches; a single environment has a batch of one. They wrap environments in R (env-r-wrappers.R)
+# and those of a server (env-wrapped-server.R).
 
-# What the function of each may ask for; the first of these is what it changes.
+# The arguments that each function may have; the first one is what it changes.
 transforms <- list(
   TransformReward = c("reward", "observation", "action", "next_observation", "terminated",
                       "truncated"),
@@ -13,7 +13,7 @@ transforms <- list(
 wrap_transform_reward <- function(traits, func, call) {
   transform <- new_transform("TransformReward", func, traits, call)
   changed <- traits
-  # The threshold is one of the rewards from inside.
+  # The threshold is about the original rewards.
   changed$spec["reward_threshold"] <- list(NULL)
   fit <- function(reward, n) {
     wrong <- if (!(is.numeric(reward) || is.logical(reward)) || length(reward) != n) {
@@ -32,7 +32,7 @@ wrap_transform_reward <- function(traits, func, call) {
   }
   around <- function(inner, n, next_step) {
     seen <- if (transform$asks("observation")) observation_memory(traits, n)
-    # With autoreset_mode "NextStep" the step after an episode's end only resets.
+    # With autoreset_mode "NextStep" the step after the end of an episode only resets.
     ended <- logical(n)
     list(
       reset = function(..., mask = NULL) {
@@ -96,7 +96,7 @@ wrap_transform_observation <- function(traits, func, observation_space = NULL, c
   list(traits = changed, around = around_batches(traits, changed, around))
 }
 
-# Where another episode began in the same step, the last observation of the one before is another.
+# If another episode began in the same step, the last observation of the previous one is different.
 change_final <- function(out, observation, inside, outside, change) {
   final <- out$next_observation
   out$next_observation <- observation
@@ -146,7 +146,7 @@ wrap_transform_action <- function(traits, func, action_space = NULL, call) {
   list(traits = changed, around = around_batches(traits, changed, around))
 }
 
-# What was observed last in each sub-environment, on which the next action is taken.
+# The last observation of each sub-environment, before the next action.
 observation_memory <- function(traits, n) {
   space <- traits$observation_space
   seen <- NULL
@@ -163,13 +163,13 @@ observation_memory <- function(traits, n) {
 
 # Functions of batches -------------------------------------------------------------------
 
-#' Make the function that goes around what is wrapped
+#' Make the function that wraps the methods of an environment
 #'
-#' @param inside,outside The traits of what is wrapped, and of what comes of it.
-#' @param around A function of `inner`, whose functions take and return batches, of how many
-#'   sub-environments there are, and of whether the step after an end only resets, that returns such
-#'   functions.
-#' @return A function as `around` of env-r-wrappers.R. The environment of a server is its third
+#' @param inside,outside The traits of the wrapped environment, and of the result.
+#' @param around A function of `inner`, whose functions take and return batches, of the number of
+#'   sub-environments, and of whether the step after an end only resets. It returns such functions.
+#' @return A function like `around` of env-r-wrappers.R. An environment of a server is its third
+#'   argument: its results are already checked.
 #'   argument: what that returns has been checked.
 #' @noRd
 around_batches <- function(inside, outside, around) {
@@ -206,8 +206,8 @@ convert_functions <- function(inner, observation, action) {
 }
 
 # The functions of an environment in R, whose results are checked before another function of the
-# user's gets them. In a vectorised one, what comes of the sub-environments whose episode has ended
-# may be anything: that of one that plays takes its place.
+# user gets them. In a vectorised one, sub-environments whose episode has ended may return anything;
+# the result of a running one replaces theirs.
 checked_functions <- function(inner, traits, num_envs) {
   force(inner)
   n <- num_envs %||% 1L
@@ -236,7 +236,7 @@ checked_functions <- function(inner, traits, num_envs) {
   ), playing)
 }
 
-# Marks errors that say themselves where they come from.
+# Marks errors that already name their origin.
 marking_wrapper <- function(code) {
   tryCatch(code, gym_error = function(cnd) {
     class(cnd) <- c("gym_error_wrapper", class(cnd))
@@ -248,9 +248,9 @@ marking_wrapper <- function(code) {
 
 #' Prepare the function of a wrapper
 #'
-#' @return A list: `wrapper`, its name; `asks(part)`, whether the function asks for this part; and
-#'   `ask(parts, n, fit)`, a function of a list of batches with `n` rows, which returns what `fit()`
-#'   makes of what the function returned, and of `n`.
+#' @return A list: `wrapper`, its name; `asks(part)`, whether the function needs this part; and
+#'   `ask(parts, n, fit)`, a function of a list of batches with `n` rows, which returns `fit()` of
+#'   the function's result and of `n`.
 #' @noRd
 new_transform <- function(wrapper, func, traits, call) {
   asked <- asked_parts(wrapper, func, call)
@@ -274,7 +274,7 @@ new_transform <- function(wrapper, func, traits, call) {
     value <- answer(parts, n, fit)
     if (!compared && n > 1L) {
       compared <<- TRUE
-      # What is drawn for a row alone is something else.
+      # Random numbers for a row alone would differ.
       if (identical(session_random_state(), before)) {
         compare_alone(transform, value, answer(last_row(parts[asked], n, traits), 1L, fit), n)
       }
@@ -284,9 +284,9 @@ new_transform <- function(wrapper, func, traits, call) {
   transform
 }
 
-#' Find out what a function asks for
-#' @return The names of the parts, with the names of the arguments that get them; the only argument
-#'   of a function may have any name, and gets what the wrapper changes.
+#' Find the parts that a function needs
+#' @return The names of the parts, named by the arguments that get them. The only argument of a
+#'   function may have any name, and gets the part that the wrapper changes.
 #' @noRd
 asked_parts <- function(wrapper, func, call) {
   known <- transforms[[wrapper]]
@@ -299,7 +299,7 @@ asked_parts <- function(wrapper, func, call) {
   asked <- intersect(names, known)
   needed <- setdiff(names[vapply(declared, is_without_default, NA)], c(known, "..."))
   if (!length(asked)) {
-    # Not `obs`, which is meant for another.
+    # Not `obs`, which stands for another part.
     stands_for_other <- length(needed) == 1L && any(startsWith(known[-1L], needed))
     if (!stands_for_other && (length(needed) == 1L || !length(needed) && length(names))) {
       return(known[[1L]])
@@ -328,8 +328,8 @@ last_row <- function(parts, n, traits) {
   Map(row, parts, names(parts))
 }
 
-# A function that takes `observation[1]` for a number of its own row would otherwise give wrong
-# numbers, and nobody would know.
+# A function that takes `observation[1]` for a number of its own row would return wrong numbers
+# without an error.
 compare_alone <- function(transform, value, alone, n) {
   numbers <- function(x) unlist(x, use.names = FALSE)
   among <- numbers(if (is.list(value)) lapply(value, rows_of, n) else rows_of(value, n))
@@ -344,7 +344,7 @@ compare_alone <- function(transform, value, alone, n) {
   }
 }
 
-# Gives what a function returned the form of a batch.
+# Converts the result of a function to a batch.
 form_batch <- function(space, value, n) {
   value <- as_batch(space, value)
   # One row of a matrix, without `drop = FALSE`.

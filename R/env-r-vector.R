@@ -1,6 +1,6 @@
 # Environments written in R as vector environments, in which episodes are played.
 
-# How many sub-environments there are where nobody chose.
+# The default number of sub-environments.
 r_sub_envs <- 16L
 vectorized_sub_envs <- 256L
 
@@ -15,8 +15,8 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
 }
 
 #' Play an environment in R in copies of it
-#' @param another A function that makes another sub-environment for an object of a class; `NULL`
-#'   where nobody can: then there is this one only.
+#' @param another A function that makes another sub-environment for an object of a class; `NULL` if
+#'   that is impossible: then there is only this one.
 #' @noRd
 r_vector_env <- function(env, num_envs, max_envs, frames, another = NULL,
                          call = rlang::caller_env()) {
@@ -67,7 +67,7 @@ new_r_vector_env <- function(traits, ..., frames, sub_env) {
 
 # One function call for each sub-environment and step ----------------------------------
 
-#' Play sub-environments side by side
+#' Play several sub-environments together
 #'
 #' @param sub_envs A list of them, all with the same traits.
 #' @noRd
@@ -110,7 +110,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
         for (k in seq_along(which)) {
           sub_env <- stepping[[k]]
           generator <- sub_env$generator
-          # As with_generator(), but the session's state is put back once for all.
+          # Like with_generator(), but the session's state is restored once for all.
           assign(".Random.seed", generator$state, envir = session)
           outs[k] <- list(sub_env$step(pick(action, k)))
           generator$state <- session$.Random.seed
@@ -133,11 +133,12 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
   )
 }
 
-#' Make the function that steps a sub-environment which is alone
+#' Make the function that steps a single sub-environment
 #'
-#' What is nearly always right is looked at quickly; the rest is left to [complete_step()]. An error
-#' of the user's functions gets its place by [single_guard()], which is made once for many steps.
-#' @return A function of an action, which returns a step as [as_vector_env()] has it.
+#' Correct results, the usual case, are checked fast; the rest is left to [complete_step()].
+#' [single_guard()], which is made once for many steps, adds the place to errors of the user's
+#' functions.
+#' @return A function of an action, which returns a step as in [as_vector_env()].
 #' @noRd
 single_stepper <- function(sub_env) {
   traits <- sub_env$traits
@@ -177,7 +178,7 @@ single_stepper <- function(sub_env) {
   }
 }
 
-# Whether a step is surely right.
+# Whether a step is certainly correct.
 is_right_step <- function(out, traits) {
   reward <- if (is.list(out)) out$reward
   flag <- out$terminated
@@ -187,7 +188,7 @@ is_right_step <- function(out, traits) {
     fits_quickly(traits, out$observation, NULL)
 }
 
-# Says where a step was that has raised an error.
+# Adds the place to an error of a step.
 single_guard <- function(sub_env) {
   sub_env$stepping <- FALSE
   function(code) {
@@ -200,9 +201,9 @@ single_guard <- function(sub_env) {
   }
 }
 
-#' Make a function that puts together what the steps of several sub-environments returned
+#' Make a function that combines the results of the steps of several sub-environments
 #'
-#' @return A function of a list of results. It returns `NULL` where one of them may be wrong.
+#' @return A function of a list of results. It returns `NULL` if one of them may be wrong.
 #' @noRd
 result_stacker <- function(traits) {
   space <- traits$observation_space
@@ -230,7 +231,7 @@ result_stacker <- function(traits) {
   }
 }
 
-# NULL where one of them is not single. Where all lack what is optional all are FALSE.
+# NULL if one of them is not a single value. If all lack an optional element, all are FALSE.
 stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
   length_of <- lengths(each)
@@ -241,7 +242,7 @@ stack_singles <- function(outs, name, optional = FALSE) {
   }
 }
 
-# NULL for spaces whose values have to be looked at one by one.
+# NULL for spaces whose values must be checked one by one.
 observation_stacker <- function(space) {
   if (!is_stackable(space)) {
     return(NULL)
@@ -270,7 +271,7 @@ observation_stacker <- function(space) {
   }
 }
 
-# The same with a look at each of them, which finds the one that is wrong.
+# Checks each result and finds the wrong one.
 stack_checked <- function(outs, sub_envs, numbers, call) {
   space <- sub_envs[[1L]]$traits$observation_space
   results <- Map(complete_step, outs, sub_envs, numbers, MoreArgs = list(call = call))
@@ -286,7 +287,8 @@ stack_checked <- function(outs, sub_envs, numbers, call) {
 
 #' Play a vectorised environment
 #'
-#' All sub-environments are always stepped, also those whose episode has ended; what these return is
+#' All sub-environments are always stepped, including those whose episode has ended; their results
+#' are ignored.
 #' left out.
 #' @noRd
 vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
@@ -314,8 +316,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   )
 }
 
-# What those return whose episode has ended may be anything: what the first that plays has returned
-# takes its place.
+# Sub-environments whose episode has ended may return anything; the result of the first running one
+# replaces theirs.
 without_ended <- function(out, space, which, n) {
   if (is.list(out)) {
     row <- rep(which[[1L]], n)

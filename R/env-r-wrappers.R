@@ -1,15 +1,15 @@
-# Wrappers of environments written in R, with the names, the arguments and the formulas of
-# Gymnasium's (https://gymnasium.farama.org/api/wrappers/).
+# Wrappers of environments written in R, with Gymnasium's names, arguments and formulas
+# (https://gymnasium.farama.org/api/wrappers/).
 #
-# A wrapper is made by a function of the traits of what it wraps and of its arguments. What it
-# returns is a list: `traits`, as the environment looks from outside, and `around`, a function of
-# `inner` (a list of the functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL`
-# where they are not vectorised), which returns these functions as they are from outside. It is
-# called for each sub-environment, so what a wrapper remembers belongs to one.
+# A wrapper is made by a function of the traits of the wrapped environment and of its arguments. It
+# returns a list: `traits`, those of the result, and `around`, a function of `inner` (a list of the
+# functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL` if not vectorised),
+# which returns the wrapped functions. It is called for each sub-environment, so each has its own
+# state.
 
 #' Wrap an environment written in R
-#' @param arguments Those of the wrapper, a list with names.
-#' @return A new environment of the same functions.
+#' @param arguments The wrapper's arguments, a list with names.
+#' @return A new environment with the same functions.
 #' @noRd
 wrap_r_env <- function(env, wrapper, arguments, call) {
   sub_env <- sub_env_of(env)
@@ -24,7 +24,7 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
   } else {
     definition$traits <- made$traits
     definition$wrappers <- c(definition$wrappers, list(made$around))
-    # A wrapper may change what the model says.
+    # A wrapper may change the transitions of the model.
     definition["model"] <- list(NULL)
     function_env$new(definition)
   }
@@ -38,7 +38,7 @@ check_wrappable <- function(env, call) {
   }
 }
 
-# Around an object of a class of the user's.
+# Wraps an object of a user's class.
 wrapped_env <- R6Class(
   "gym_wrapped_env",
   inherit = GymEnv,
@@ -142,7 +142,7 @@ wrap_rescale_observation <- function(traits, min_obs, max_obs, call) {
       size <- prod(space$shape) * (num_envs %||% 1L)
       change_observation(inner, function(observation) {
         observation <- double_from_integer64(observation)
-        # What is no such observation is found by the checks that follow.
+        # The checks that follow find an invalid observation.
         if (is.numeric(observation) && length(observation) == size) {
           rescale(observation)
         } else {
@@ -213,7 +213,7 @@ wrap_normalize_reward <- function(traits, gamma = 0.99, epsilon = 1e-8, call) {
       if (length(out$reward) != n || !is_flags(out$terminated, n)) {
         return(out$reward)
       }
-      # As in Gymnasium, the discounted sum of rewards begins anew after a terminated episode only.
+      # As in Gymnasium, the discounted sum of rewards starts again only after a terminated episode.
       which <- playing$which
       goes_on <- !out$terminated[which]
       discounted[which] <<- discounted[which] * gamma * goes_on + out$reward[which]
@@ -263,7 +263,7 @@ change_observation <- function(inner, change) {
   inner
 }
 
-# `change` is a function of what the step returned.
+# `change` is a function of the step's result.
 change_reward <- function(inner, change) {
   step <- inner$step
   inner$step <- function(action) {
@@ -298,7 +298,7 @@ check_epsilon <- function(epsilon, call) {
 
 # Scales --------------------------------------------------------------------------------
 
-# The numbers of a Box, given row by row, in the order in which a value in R has them.
+# Converts the numbers of a Box from row by row to R's order.
 spread_numbers <- function(x, shape, num_envs) {
   x <- rep_len(x, prod(shape))
   if (is.null(num_envs)) {
@@ -334,8 +334,8 @@ check_same_infinite <- function(from, to, value, arg, call) {
   }
 }
 
-# A function that takes numbers of one Box to those of another, in straight lines. Where a number
-# has one bound only it is moved.
+# A linear function from the numbers of one Box to those of another. A number with only one bound is
+# shifted.
 rescaler <- function(from, to, num_envs) {
   spread <- function(x) spread_numbers(x, from$shape, num_envs)
   both <- is.finite(from$low) & is.finite(from$high)
@@ -349,7 +349,7 @@ rescaler <- function(from, to, num_envs) {
   bounds <- lapply(list(from$low, from$high, to$low, to$high), spread)
   function(x) {
     y <- start + (x - origin) * scale
-    # Rounding must not take a number within the bounds beyond them.
+    # Rounding must not move a number beyond its bounds.
     y <- ifelse(x >= bounds[[1L]], pmax(y, bounds[[3L]]), y)
     y <- ifelse(x <= bounds[[2L]], pmin(y, bounds[[4L]]), y)
     dim(y) <- dim(x)
@@ -359,12 +359,12 @@ rescaler <- function(from, to, num_envs) {
 
 # Running moments -----------------------------------------------------------------------
 
-# Begins as Gymnasium's RunningMeanStd: as if a ten-thousandth of a value had been seen.
+# Starts like Gymnasium's RunningMeanStd: as if a ten-thousandth of a value had been seen.
 running_moments <- function(size) new_moments(1e-4, numeric(size), rep(1e-4, size))
 
 variance_of <- function(moments) moments$squares / moments$count
 
-# Which sub-environments are playing: what the others return does not count.
+# The running sub-environments: results of the others are ignored.
 playing_sub_envs <- function(n) rlang::env(which = seq_len(n), all = seq_len(n))
 
 follow_ends <- function(inner, playing) {

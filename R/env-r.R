@@ -1,65 +1,63 @@
-#' Make an environment of R functions
+#' Make an environment from R functions
 #'
-#' Makes an environment that is played as those of [gym_make()] are, from two functions of your own:
-#' one that starts an episode, and one that takes a step. No server is started for it. A class of
-#' environments, as in Gymnasium, is made with [GymEnv].
+#' Make an environment that works like those of [gym_make()] from two functions: one that starts an
+#' episode, and one that takes a step. It does not need a server. To write a class of environments,
+#' as in Gymnasium, use [GymEnv].
 #'
-#' The functions keep what they have to remember in `self`, an R environment:
-#' `self$position <- 0`. Every sub-environment has a `self` of its own, so that [rollout()] and
-#' every search can play many of them side by side; the environment that they are given does not
-#' move when they play it.
+#' The functions keep their state in `self`, an R environment: `self$position <- 0`. Each
+#' sub-environment has its own `self`, so [rollout()] and every search can play many of them
+#' together. The environment that you pass to them does not change.
 #'
-#' What the functions return is checked in each step: an observation must belong to the observation
-#' space, bounds included, a reward must be one number, a flag `TRUE` or `FALSE`. An action is
-#' checked before `step` gets it; only a Box action outside of its bounds is handed on, as in
-#' Gymnasium. [check_env()] finds out more.
+#' Each step checks the results of the functions. An observation must belong to the observation
+#' space, including its bounds; a reward must be one number; a flag `TRUE` or `FALSE`. Actions are
+#' checked before `step` gets them. Only a Box action outside its bounds is passed on, as in
+#' Gymnasium. [check_env()] checks more.
 #'
 #' # Random numbers
 #'
-#' Each environment, and each sub-environment, has a random generator of its own. `runif()`,
-#' `sample()` and the others draw from it within `reset` and `step`, and the session's own is
-#' afterwards as it was. `$reset(seed = 1)` seeds it, and a seed gives the same draws whatever
-#' `RNGkind()` the session has. A seed of at most 2^31 - 1 gives what [set.seed()] gives for R's
-#' generator `"L'Ecuyer-CMRG"`; one up to 2^53 a stream of its own, made of its lower 31 bits and of
-#' the others. An environment that was never seeded draws one seed from the
-#' session's generator when it is reset for the first time, so that [set.seed()] fixes it, too.
+#' Each environment and each sub-environment has its own random generator. In `reset` and `step`,
+#' `runif()`, `sample()` and the others draw from it, and the session's generator does not change.
+#' `$reset(seed = 1)` sets its seed. A seed gives the same random numbers for any `RNGkind()` of the
+#' session. A seed of at most 2^31 - 1 is like [set.seed()] for R's generator `"L'Ecuyer-CMRG"`. A
+#' larger one, up to 2^53, selects its own stream, made of its lower 31 bits and of the others. An
+#' environment that was never seeded draws one seed from the session's generator at its first reset,
+#' so [set.seed()] fixes it, too.
 #'
 #' # Vectorised functions
 #'
 #' With `vectorized = TRUE` the functions play all sub-environments at once, which is many times
-#' faster where they calculate with whole vectors. `self$num_envs` says how many there are. `reset`
-#' returns a batch of observations, for a Box of one dimension a matrix with a row for each
-#' sub-environment; `step` gets a batch of actions and returns a batch of observations and vectors
-#' for `reward`, `terminated` and `truncated`. Sub-environments whose episode has ended go on
-#' being stepped, and what they return is ignored, until all are reset. They share one generator.
+#' faster if they compute with whole vectors. `self$num_envs` is the number of sub-environments.
+#' `reset` returns a batch of observations, for a Box of one dimension a matrix with a row for each
+#' sub-environment. `step` gets a batch of actions and returns a batch of observations and vectors
+#' for `reward`, `terminated` and `truncated`. Sub-environments whose episode has ended are still
+#' stepped, and their results ignored, until all are reset. They share one generator.
 #'
 #' @param reset A function of `self` that starts an episode and returns the first observation. With
 #'   a second argument `options` it gets the options of `$reset(options = )`.
 #' @param step A function of `self` and `action` that takes a step and returns a list of
 #'   `observation`, `reward` (a number), `terminated` (whether the episode ended by the
-#'   environment's own rules) and perhaps `truncated` (whether it was cut off, `FALSE` without it)
+#'   environment's own rules) and optionally `truncated` (whether it was cut off, default `FALSE`)
 #'   and `info` (a list).
 #' @param observation_space,action_space The spaces, such as `space_box(-1, 1, shape = 2)` and
 #'   `space_discrete(3)`.
-#' @param render A function of `self` that draws the environment as it is: it either plots with R's
-#'   graphics, or returns a picture, as a raster image, a matrix of greys or of colours, or an array
-#'   of height x width x 3. `NULL`, the default, for an environment that cannot be drawn.
+#' @param render A function of `self` that draws the environment. It plots with R's graphics, or
+#'   returns a picture: a raster image, a matrix of greys or of colours, or an array of height x
+#'   width x 3. `NULL`, the default, for an environment that cannot be drawn.
 #' @param vectorized Do the functions play all sub-environments at once? `FALSE`, the default, or
 #'   `TRUE`.
-#' @param ... Further values, by name, which each `self` has from the beginning, such as
-#'   `size = 5` for `self$size`. In a vectorised environment `num_envs` is how many
-#'   sub-environments this object has, 256 unless it is given.
-#' @param model The environment's [model][gym_model()], for [env_model()], the table of its
-#'   transitions, or a function of the environment that returns one of them; `NULL`, the default,
-#'   for an environment that has none. A table does not say where episodes start: that is taken
-#'   from `reset`, exactly where it draws nothing, and from 1000 resets where it draws.
-#' @param id What the environment is called in messages and titles, a string.
-#' @param max_episode_steps After how many steps an episode is cut off, a whole number; `NULL`, the
-#'   default, for never.
-#' @param reward_threshold The mean return from which the environment counts as solved, a number;
+#' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
+#'   `self$size`. In a vectorised environment `num_envs` is the number of sub-environments of this
+#'   object, 256 by default.
+#' @param model The environment's [model][gym_model()], for [env_model()]; the table of its
+#'   transitions; or a function of the environment that returns one of them. `NULL`, the default,
+#'   for none. If you give a table, `reset` determines where episodes start: exactly if it is not
+#'   random, and otherwise estimated from 1000 resets.
+#' @param id The name of the environment in messages and titles, a string.
+#' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
+#'   `NULL`, the default, for no limit.
+#' @param reward_threshold The mean return from which the environment counts as solved, a number.
 #'   `NULL`, the default, for none.
-#' @param render_fps How many frames make a second of it, a number; `NULL`, the default, leaves it
-#'   to [animate()].
+#' @param render_fps The number of frames per second. `NULL`, the default, leaves it to [animate()].
 #' @return An object of class `gym_r_env` and `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE)`: starts an episode and returns the
 #'     first observation, or a list of `observation` and `info`,
@@ -69,13 +67,12 @@
 #'   * `$close()`, `$is_open`,
 #'   * `$observation_space`, `$action_space`, and `$single_observation_space`,
 #'     `$single_action_space`, which differ from them in a vectorised environment,
-#'   * `$num_envs`: `NULL`, or of a vectorised environment how many sub-environments it has,
+#'   * `$num_envs`: `NULL`, or the number of sub-environments of a vectorised environment,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` and `render_fps`.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, and in
-#'   `$reset()` and `$step()` for a function that does not return what it should;
-#'   `gym_error_space` for an action or an observation that does not fit its space;
-#'   `gym_error_environment` where a function of yours raises an error: it also has the classes of
-#'   that error, which is its `parent`.
+#' @section Errors: `gym_error_argument` for an invalid argument, and in `$reset()` and `$step()`
+#'   for an invalid result of your function. `gym_error_space` for an action or an observation that
+#'   does not fit its space. `gym_error_environment` if your function raises an error: it also has
+#'   the classes of that error, which is its `parent`.
 #' @section Warnings: `gym_warning_step_after_done`.
 #' @seealso [GymEnv], [gym_register()], [check_env()], `vignette("own-environment")`
 #' @export
@@ -119,7 +116,7 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
   }
   parameters <- list(...)
   check_dots_named(parameters, "size = 5")
-  # A space that was left out is refused as one that is NULL is.
+  # A missing space raises the same error as NULL.
   if (missing(observation_space)) observation_space <- NULL
   if (missing(action_space)) action_space <- NULL
   traits <- new_traits(
@@ -131,8 +128,8 @@ gym_env <- function(reset, step, observation_space, action_space, render = NULL,
   ))
 }
 
-# The sub-environments of functions are made of a definition: `traits`, the functions, `vectorized`,
-# `parameters`, the values that each `self` begins with, and `wrappers`, see wrap_r_env().
+# The definition of sub-environments made from functions: `traits`, the functions, `vectorized`,
+# `parameters`, the values with which each `self` starts, and `wrappers`, see wrap_r_env().
 function_env <- R6Class(
   "gym_function_env",
   inherit = GymEnv,
@@ -146,13 +143,13 @@ function_env <- R6Class(
   private = list(gym_definition = NULL)
 )
 
-# NULL for an object of a class of the user's.
+# NULL for an object of a user's class.
 definition_of <- function(env) {
   if (inherits(env, "gym_function_env")) env$.__enclos_env__$private$gym_definition
 }
 
-#' Make a sub-environment of functions, with a `self` of its own
-#' @param num_envs How many sub-environments it has if it is vectorised.
+#' Make a sub-environment from functions, with its own `self`
+#' @param num_envs The number of sub-environments if it is vectorised.
 #' @noRd
 definition_sub_env <- function(definition, num_envs = NULL) {
   reset <- definition$reset

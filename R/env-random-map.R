@@ -1,15 +1,15 @@
-# FrozenLake's random maps. Gymnasium draws one in the constructor, from a generator that nobody can
-# seed; here it is drawn from the seed of what is played, and sent.
+# FrozenLake's random maps. Gymnasium draws one in the constructor, from a generator that cannot be
+# seeded. Here it is drawn from the seed of the run and sent.
 
 lake_size <- 8L
 chance_of_ice <- 0.8
 
-#' Draw the map of a FrozenLake that is to have a random one
+#' Draw the map of a FrozenLake with a random map
 #'
 #' @param env An environment, or its id.
 #' @param arguments The arguments that it is made with.
-#' @param seed What the map is drawn from; of several the first that is given. `NULL` leaves the map
-#'   to the server.
+#' @param seed The seed of the map; of several, the first that is given. `NULL` leaves the map to
+#'   the server.
 #' @return The arguments, with the map as `desc`.
 #' @noRd
 with_random_map <- function(env, arguments, seed) {
@@ -27,7 +27,7 @@ wants_random_map <- function(env, arguments) {
     is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
 }
 
-# As Gymnasium does: cells are drawn until there is a way from the start to the goal.
+# Like Gymnasium: draws cells until there is a way from the start to the goal.
 draw_lake <- function() {
   repeat {
     cells <- matrix(stats::runif(lake_size^2) < chance_of_ice, lake_size)

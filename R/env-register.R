@@ -1,26 +1,26 @@
-#' Name an environment written in R
+#' Register an environment written in R
 #'
-#' Makes an environment written in R known by an id to everything that takes one: [gym_make()],
-#' [rollout()], every search, [env_registry()]. It is known until the session's end. An id that is
-#' registered again gets the new environment, also where Gymnasium has one of this id.
+#' Register an environment written in R under an id, which [gym_make()], [rollout()], every search
+#' and [env_registry()] then accept. It is registered until the end of the session. Registering an
+#' id again replaces the environment, even one of Gymnasium.
 #'
-#' Where several sub-environments play side by side each is made by `entry_point`, unless this is
-#' or returns an environment of [gym_env()], of which copies are made. What `entry_point` draws at
-#' random it draws under the same seed every time, so that all of them are the same environment:
-#' what is to differ from episode to episode is drawn in `reset`.
+#' If several sub-environments are played together, `entry_point` makes each of them. If it is or
+#' returns an environment of [gym_env()], that is copied. Random numbers in `entry_point` use the
+#' same seed every time, so that all copies are the same environment. Draw values that should differ
+#' between episodes in `reset`.
 #'
 #' @param id The id, a string of letters, digits and `_.:/-`, such as `"Corridor-v0"`.
-#' @param entry_point What makes the environment: an environment of [gym_env()], a function that
+#' @param entry_point The environment's maker: an environment of [gym_env()], a function that
 #'   returns an environment, or the R6 generator of a class that inherits from [GymEnv].
-#' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] may replace
-#'   by others. For an environment of [gym_env()] they are values that each `self` begins with.
-#' @param max_episode_steps After how many steps an episode is cut off, a whole number; `NULL`, the
-#'   default, leaves the environment its own limit.
-#' @param reward_threshold The mean return from which the environment counts as solved, a number;
-#'   `NULL`, the default, leaves the environment its own.
+#' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] can override.
+#'   For an environment of [gym_env()] they are values with which each `self` starts.
+#' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
+#'   `NULL`, the default, keeps the environment's own limit.
+#' @param reward_threshold The mean return from which the environment counts as solved, a number.
+#'   `NULL`, the default, keeps the environment's own.
 #' @return The id, invisibly.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be, and from
-#'   `gym_unregister()` for an id that is not registered.
+#' @section Errors: `gym_error_argument` for an invalid argument, and from `gym_unregister()` for an
+#'   id that is not registered.
 #' @seealso [gym_env()], [GymEnv]
 #' @export
 #' @examples
@@ -95,7 +95,7 @@ check_entry_point <- function(entry_point, call = rlang::caller_env()) {
   }
 }
 
-# Environments that a server cannot know: those whose id is registered in this session.
+# Whether the id is registered in this session, which a server cannot know.
 is_registered <- function(x) {
   id <- if (inherits(x, "gym_wrapped")) x$env_id else x
   rlang::is_string(id) && id %in% names(the_session$environments)
@@ -105,7 +105,7 @@ is_registered <- function(x) {
 
 #' Make a registered environment
 #'
-#' @param arguments Those of `entry_point`, and `max_episode_steps`, -1 for no limit.
+#' @param arguments The arguments of `entry_point`, and `max_episode_steps`, -1 for no limit.
 #' @noRd
 make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
   if (!inherits(id, "gym_wrapped")) {
@@ -164,7 +164,7 @@ own_limit <- function(max_episode_steps, call) {
   as.integer(check_count(max_episode_steps, call = call))
 }
 
-# Another environment of the same functions, with other values.
+# Another environment with the same functions and other values.
 change_function_env <- function(env, changes, parameters, id, call) {
   definition <- definition_of(env)
   check_parameters(parameters, definition, id, call)
@@ -173,8 +173,8 @@ change_function_env <- function(env, changes, parameters, id, call) {
   function_env$new(definition)
 }
 
-# The arguments that the function takes, or the `initialize()` of the class or of one that it
-# inherits from; without one it takes none.
+# Checks the arguments against those of the function, or of the `initialize()` of the class or of
+# one that it inherits from; without one it has none.
 check_taken <- function(given, entry_point, id, call) {
   taken <- entry_point
   while (inherits(taken, "R6ClassGenerator")) {
@@ -185,7 +185,7 @@ check_taken <- function(given, entry_point, id, call) {
   refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
 }
 
-# A value that the functions do not know would change nothing.
+# A value that the functions do not use would change nothing.
 check_parameters <- function(given, definition, id, call = rlang::caller_env()) {
   known <- c(names(definition$parameters), if (definition$vectorized) "num_envs")
   strange <- setdiff(names(given), known)
@@ -249,7 +249,7 @@ with_num_envs <- function(env, num_envs, id, call) {
   change_function_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
 }
 
-#' See a registered environment as a vector environment
+#' Convert a registered environment to a vector environment
 #' @noRd
 registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
                                   call = rlang::caller_env()) {
@@ -271,7 +271,7 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
 
 # In the registry ----------------------------------------------------------------------
 
-#' Put the environments written in R into the form of the server's registry
+#' Convert the environments written in R to rows of the server's registry
 #' @param search A text to look for in their ids, `NULL` for all.
 #' @noRd
 registered_rows <- function(search = NULL) {
@@ -291,7 +291,7 @@ registered_rows <- function(search = NULL) {
   )
 }
 
-# What is known without making the environment.
+# The part of the spec that is known without making the environment.
 registered_spec <- function(id) {
   registered <- the_session$environments[[id]]
   spec <- if (inherits(registered$entry_point, "gym_function_env")) registered$entry_point$spec
@@ -305,7 +305,7 @@ is_vectorized_entry <- function(id) {
   inherits(entry_point, "gym_function_env") && definition_of(entry_point)$vectorized
 }
 
-# A server cannot see an environment that is written in R.
+# A server has no access to an environment written in R.
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
     id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id

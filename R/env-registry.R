@@ -1,20 +1,18 @@
-#' List the environments of Gymnasium
+#' List the available environments
 #'
-#' Those that the server can make, those that it could with an extra, see
-#' [gym_server_install()], and some that it cannot make at all; and the environments written in R
-#' that this session has registered, see [gym_register()].
+#' List the environments that the server can make, those that require an extra (see
+#' [gym_server_install()]), some that it cannot make at all, and the environments in R that this
+#' session has registered (see [gym_register()]).
 #'
-#' @param client A client, by default that of [gym_client()].
-#' @param search A text to look for in the ids, whatever its case; where none has
-#'   it the nearest ids are listed. `NULL`, the default, lists all.
-#' @return A data frame with one row for each environment: `id` (a string),
-#'   `max_episode_steps` (integer, the limit of an episode, `NA` for none),
-#'   `reward_threshold` (double, the mean return from which it counts as solved,
-#'   `NA` for none), `vectorised` (logical, whether it has a vector
-#'   implementation of its own), `extra` (a string, the part of the server that it
-#'   needs beyond what it always has, such as `"box2d"`, `NA` for none), `available`
-#'   (logical, whether it can be made) and `reason` (a string, why it cannot, `NA` where it
-#'   can, or where an older server gives none).
+#' @param client A client. The default is the session's client, [gym_client()].
+#' @param search A text to look for in the ids, ignoring case. If there is no match, similar ids are
+#'   listed. `NULL`, the default, lists all.
+#' @return A data frame with one row for each environment: `id` (a string), `max_episode_steps`
+#'   (integer, the limit of an episode, `NA` for none), `reward_threshold` (double, the mean return
+#'   from which it counts as solved, `NA` for none), `vectorised` (logical, whether it has its own
+#'   vector implementation), `extra` (a string, the extra of the server that it requires, such as
+#'   `"box2d"`, `NA` for none), `available` (logical, whether it can be made) and `reason` (a
+#'   string, why it cannot be made, or `NA`; older servers give none).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()

@@ -1,17 +1,16 @@
 #' Draw an environment's current frame
 #'
-#' Asks the server for a picture of the environment as it is now.
+#' Return a picture of the environment's current state from the server.
 #'
 #' @inheritParams env_reset
-#' @param which For a vector environment: the number of the sub-environment to draw, 1, the default,
-#'   for the first. An environment's own vector implementation (`"vector_entry_point"`) draws all of
-#'   them at once, which the server allows for 16 at most.
-#' @return An object of class `gym_frame`: an integer array of height x width x
-#'   3 (red, green, blue, each 0 to 255), or x 1 (grey) or x 4 (the last how opaque) where the
-#'   environment draws such. [plot()] shows it, [as.raster()] makes it a raster image.
-#' @section Errors: `gym_error_http_400` for an unknown instance, one that has
-#'   not been reset yet (code `reset_needed`) or that cannot be drawn (code
-#'   `cannot_render`); `gym_error_connection`.
+#' @param which For a vector environment: the number of the sub-environment to draw. The default is
+#'   1, the first. An environment's own vector implementation (`"vector_entry_point"`) draws all of
+#'   them at once, which the server allows for at most 16.
+#' @return An object of class `gym_frame`: an integer array of height x width x 3 (red, green, blue,
+#'   each 0 to 255), or x 1 (grey) or x 4 (the last is the opacity) for some environments. [plot()]
+#'   shows it, [as.raster()] converts it to a raster image.
+#' @section Errors: `gym_error_http_400` for an unknown instance, one that has not been reset yet
+#'   (code `reset_needed`) or that cannot be drawn (code `cannot_render`); `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -36,7 +35,7 @@ new_frame <- function(values) structure(values, class = "gym_frame")
 as.raster.gym_frame <- function(x, ...) {
   values <- unclass(x)
   if (dim(values)[[3L]] == 1L) {
-    # Shades of grey are a matrix to as.raster().
+    # as.raster() expects shades of grey as a matrix.
     dim(values) <- dim(values)[1:2]
   }
   as.raster(values, max = 255L)

@@ -1,18 +1,16 @@
-#' Ask for an environment's spaces
+#' Get an environment's spaces
 #'
-#' `env_action_space_info()` returns which actions an environment takes,
-#' `env_observation_space_info()` which observations it returns.
+#' `env_action_space_info()` returns the space of the actions, `env_observation_space_info()` that
+#' of the observations.
 #'
 #' @inheritParams env_reset
-#' @return A space: a list with the element `name` and, for Discrete, `n` (the
-#'   number of values) and `start` (the first of them), for Box, `shape`,
-#'   `dtype`, `low` and `high`, the bounds row by row, which may be infinite;
-#'   for the other kinds see [space_sample()]. In a vector environment it is the space of the
-#'   values of all sub-environments together: a Box of shape 4 becomes one of shape `c(n, 4)`,
-#'   Discrete a MultiDiscrete of shape `n`, Tuple and Dict have such parts, and the others become
-#'   a Tuple with a space for each sub-environment.
-#' @section Errors: `gym_error_http_400` for an unknown instance,
-#'   `gym_error_connection`.
+#' @return A space: a list with the element `name` and, for Discrete, `n` (the number of values) and
+#'   `start` (the first of them), for Box, `shape`, `dtype`, `low` and `high`, the bounds row by
+#'   row, which may be infinite. For the other kinds see [space_sample()]. For a vector environment
+#'   it is the space of all sub-environments together: a Box of shape 4 becomes one of shape
+#'   `c(n, 4)`, a Discrete space a MultiDiscrete of shape `n`. Tuple and Dict have such parts. The
+#'   others become a Tuple with a space for each sub-environment.
+#' @section Errors: `gym_error_http_400` for an unknown instance, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -32,13 +30,13 @@ env_observation_space_info <- function(x, instance_id) {
 
 #' Draw a random action
 #'
-#' Draws from the environment's action space on the server, whose generator is
-#' seeded together with the environment.
+#' Draw an action from the environment's action space on the server, whose generator has the seed of
+#' the environment.
 #'
 #' @inheritParams env_reset
-#' @return An action that [env_step()] takes: a whole number for Discrete, a numeric
-#'   vector or array for Box; [space_sample()] has the table of all kinds. In a vector environment
-#'   an action for each sub-environment.
+#' @return An action for [env_step()]: a whole number for Discrete, a numeric vector or array for
+#'   Box. [space_sample()] lists all kinds. In a vector environment an action for each
+#'   sub-environment.
 #' @inheritSection env_action_space_info Errors
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -52,11 +50,10 @@ env_action_space_sample <- function(x, instance_id) {
   read_values(decode_sample(instance, answer$action), "Its `action`")
 }
 
-#' Ask whether a value belongs to a space
+#' Check whether a value belongs to a space
 #'
 #' @inheritParams env_reset
-#' @param action,observation The value to look at: anything that could be an
-#'   action or an observation.
+#' @param action,observation The value to check: any R object.
 #' @return `TRUE` or `FALSE`.
 #' @inheritSection env_action_space_info Errors
 #' @export
@@ -103,11 +100,11 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
 
 # Environments named by their id ----------------------------------------------------
 
-#' Find out the spaces of an environment
+#' Find the spaces of an environment
 #'
-#' An environment that is named by its id is made for the question, and closed.
-#' @return A list: `observation_space` and `action_space`, those of a single sub-environment where
-#'   there are several, and `spec`.
+#' An environment given by its id is made for this and closed.
+#' @return A list: `observation_space` and `action_space`, those of a single sub-environment, and
+#'   `spec`.
 #' @noRd
 known_spaces <- function(env, client, call = rlang::caller_env()) {
   check_environment(env, call = call)
@@ -122,8 +119,8 @@ known_spaces <- function(env, client, call = rlang::caller_env()) {
   )
 }
 
-# Closes an environment that was made for a question. An error on the way is more useful than one
-# from closing, which would replace it.
+# Closes an environment that was made to get its spaces. An error before closing is more useful than
+# one from closing.
 close_quietly <- function(env) tryCatch(env$close(), gym_error = function(cnd) NULL)
 
 check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {

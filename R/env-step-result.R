@@ -1,12 +1,12 @@
-# Checks of what an environment that a user has written in R returns. It must keep to the same rules
-# as the server's environments, which the server checks.
+# Checks of the results of a user's environment. They follow the same rules as the server's checks
+# of its environments.
 
 flags <- c("terminated", "truncated")
 
 is_server_env <- function(env) inherits(env, "gym_server_env")
 
-# Nobody wants the infos of what is played: they are not asked for where a server would send them.
-# A server's environment takes a list of seeds from here alone.
+# Play does not need infos, so they are not requested from a server. Only a server's environment
+# takes a list of seeds.
 first_observation <- function(env, seed, ...) {
   if (is_server_env(env)) {
     if (is.list(seed)) class(seed) <- "gym_seed_lists"
@@ -16,10 +16,10 @@ first_observation <- function(env, seed, ...) {
   }
 }
 
-#' Take a step, and check what it returns where a user has written the environment
-#' @param n How many sub-environments step.
-#' @param which The numbers of these, `NULL` for all.
-#' @param finals Whether `next_observation` is wanted.
+#' Take a step, and check the result of a user's environment
+#' @param n The number of sub-environments that step.
+#' @param which Their numbers, `NULL` for all.
+#' @param finals Whether `next_observation` is needed.
 #' @noRd
 take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   if (is_server_env(env)) {
@@ -34,8 +34,8 @@ take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   out
 }
 
-# What a step returned, with plain numbers where it has an integer64. Each step is looked at, so
-# what has no class is left at once.
+# The result of a step, with integer64 converted to plain numbers. It runs in each step, so values
+# without a class are skipped at once.
 plain_step <- function(out) {
   if (is.list(out)) {
     for (name in c("observation", "next_observation")) {
@@ -47,13 +47,13 @@ plain_step <- function(out) {
   out
 }
 
-#' Check what a step returned, and complete it
+#' Check the result of a step and complete it
 #'
-#' The one check of the steps of environments in R: [check_env()] finds the same.
-#' @param out What the user's `step()` returned.
+#' The only check of the steps of environments in R: [check_env()] finds the same problems.
+#' @param out The result of the user's `step()`.
 #' @param sub_env The sub-environment, which has counted the step.
-#' @return A list of `observation`, `reward`, `terminated`, `truncated`, which also says where the
-#'   limit of steps was reached, and `info`.
+#' @return A list of `observation`, `reward`, `terminated`, `truncated`, which includes the step
+#'   limit, and `info`.
 #' @noRd
 complete_step <- function(out, sub_env, sub_env_number = NULL, call = rlang::caller_env(),
                           where = step_place(sub_env, sub_env_number)) {
@@ -68,7 +68,7 @@ complete_step <- function(out, sub_env, sub_env_number = NULL, call = rlang::cal
   )
 }
 
-# Who returned what is wrong, and when. It is put into words where something is.
+# The place of a wrong result. It is put into words only when needed.
 step_place <- function(sub_env, sub_env_number = NULL) {
   in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
   paste0("`step()` of ", sub_env$traits$spec$id, " in step ", sub_env$taken, " of the episode",
@@ -77,11 +77,11 @@ step_place <- function(sub_env, sub_env_number = NULL) {
 
 # Observations -------------------------------------------------------------------------
 
-#' Check an observation that an environment in R returned, or a batch of them
+#' Check an observation returned by an environment in R, or a batch of them
 #'
-#' @param n Of how many sub-environments it is a batch; `NULL` for a single observation.
+#' @param n The number of sub-environments in the batch; `NULL` for a single observation.
 #' @param where Who returned it and when, in words.
-#' @return The observation, in the form that a server's has.
+#' @return The observation, in the form of a server's.
 #' @noRd
 checked_observation <- function(traits, observation, n, where, call) {
   space <- traits$observation_space
@@ -98,7 +98,7 @@ checked_observation <- function(traits, observation, n, where, call) {
   tidy_value(space, observation, n)
 }
 
-# Whether it fits, as it nearly always does; a single one is looked at as a batch of one.
+# Whether it fits, as is usual; a single observation is checked as a batch of one.
 fits_quickly <- function(traits, observation, n) {
   if (is.null(n)) {
     if (!length(observation) || !is.atomic(observation) || !is.null(dim(observation))) {
@@ -125,10 +125,10 @@ refuse_observation <- function(cnd, space, where, call) {
 
 # The other parts ------------------------------------------------------------------------
 
-#' Check all of what a step returned but the observation
-#' @param n For how many sub-environments.
+#' Check the elements of a step's result, except the observation
+#' @param n The number of sub-environments.
 #' @param where Who returned it and when, in words.
-#' @return The same; where it lacks `truncated` and need not have it, that is FALSE.
+#' @return The same; a missing `truncated` becomes FALSE if it is optional.
 #' @noRd
 check_step_parts <- function(out, n, where, call,
                              needed = c("observation", "reward", "terminated")) {
@@ -151,10 +151,10 @@ check_step_parts <- function(out, n, where, call,
   out
 }
 
-#' Find the parts of what a step returned that are wrong
-#' @param finite Whether a reward that is infinite is wrong, too.
-#' @return What each of them must be, a character vector with their names; `NULL` where all are
-#'   right.
+#' Find the wrong elements of a step's result
+#' @param finite Whether an infinite reward is wrong, too.
+#' @return The requirement for each of them, a character vector with their names; `NULL` if all are
+#'   correct.
 #' @noRd
 wrong_parts <- function(out, n, finite = FALSE) {
   right <- c(

@@ -1,10 +1,9 @@
-# Resets and steps of an instance: what is sent is checked and written, the request performed, and
-# what comes is read, checked and named. The request is prepared once for each combination of a
-# call's flags.
+# Resets and steps of an instance: check and write the arguments, perform the request, and read,
+# check and name the result. The request is prepared once for each combination of a call's flags.
 
 #' Start an episode
-#' @param named Whether observations are to carry their names: those of the classic calls do not.
-#' @param infos Whether the server is to make infos.
+#' @param named Whether observations have names: those of the classic calls do not.
+#' @param infos Whether the server makes infos.
 #' @noRd
 reset_instance <- function(instance, seed, options, return_info = FALSE, mask = NULL,
                            named = FALSE, infos = TRUE, call = rlang::caller_env()) {
@@ -41,8 +40,8 @@ prepare_reset <- function(instance, named, infos) {
 
 #' Take a step
 #' @inheritParams reset_instance
-#' @param finals Whether the server is to send the last observations of episodes after which another
-#'   one began.
+#' @param finals Whether the server sends the last observations of episodes after which another one
+#'   began.
 #' @noRd
 step_instance <- function(instance, action, which = NULL, render = FALSE, named = FALSE,
                           infos = TRUE, finals = TRUE, call = rlang::caller_env()) {
@@ -79,12 +78,12 @@ prepare_step <- function(instance, which, render, named, infos, finals) {
   }
 }
 
-# The field by which a server is told to make no infos. Classic servers do not know it.
+# The field that tells a server to make no infos. Classic servers do not know it.
 info_field <- function(instance, infos) if (!infos && !instance$classic) c(info = "false")
 
-#' Prepare the requests of one of an instance's routes
-#' @param body,sends_tensors As [prepare_request()] takes them.
-#' @param read_answer A function of a parsed answer, which returns the result or says what is wrong.
+#' Prepare the requests to one of an instance's routes
+#' @param body,sends_tensors As for [prepare_request()].
+#' @param read_answer A function of a parsed answer, which returns the result or raises an error.
 #' @noRd
 prepare_instance_request <- function(instance, route, fields, named, read_answer,
                                      body = new_json_body(fields), sends_tensors = FALSE) {
@@ -115,7 +114,7 @@ prepare_single_step <- function(instance, fields, named) {
   )
   general <- sends || instance$classic
   request$write <- if (general) function(action) NULL else json_writer(actions)
-  # A classic server's error does not say that an action was wrong, so bounds are checked here.
+  # A classic server's error does not say that an action was wrong, so check bounds here.
   bounds <- instance$classic && inherits(actions, "gym_space_discrete")
   request$check_and_write <- function(action, call) {
     action <- numbered_actions(instance, action, call)
@@ -161,7 +160,7 @@ flags_and_reward <- c("reward", "terminated", "truncated")
 # Observations -------------------------------------------------------------------------------
 
 #' Make the function that reads an answer's observations
-#' @param space Of what is observed.
+#' @param space The observation space.
 #' @param name The answer's field, or the name of its tensors.
 #' @return A function of a parsed answer.
 #' @noRd
@@ -179,7 +178,7 @@ observation_reader <- function(instance, space, named, name = "observation") {
     }
   }
   function(answer) {
-    # As it nearly always is, or NULL.
+    # The usual form, or NULL.
     observation <- if (is.null(answer$tensors)) {
       read_json(answer[[name]])
     } else if (in_one) {
@@ -195,7 +194,7 @@ observation_reader <- function(instance, space, named, name = "observation") {
   }
 }
 
-# The info of an answer, `n` that of how many sub-environments, `NULL` for a single environment.
+# The info of an answer. `n` is the number of sub-environments, `NULL` for a single environment.
 read_info <- function(answer, n) {
   info <- answer$info
   if (!length(info)) {

@@ -1,21 +1,21 @@
-# How many sub-environments an environment gets that is made from its id.
+# The number of sub-environments of an environment made from its id.
 #
-# The rule depends on the environment and on how many episodes are played, never on cores, workers
-# or time: then a seed gives the same results everywhere. Many sub-environments share the cost of a
-# message and of asking the policy; too many make large messages, and most of them wait while the
+# The rule depends on the environment and the number of episodes, never on cores, workers or time,
+# so that a seed gives the same results everywhere. Many sub-environments share the cost of a
+# message and of calling the policy. Too many make large messages, and most of them wait while the
 # last episodes of a batch end.
 
 entry_point_sub_envs <- 256L
 most_sub_envs <- 256L
 fewest_sub_envs <- 16L
 
-# So many bytes may the observations of all sub-environments take, where there are more than 16.
+# The most bytes for the observations of all sub-environments, if there are more than 16.
 most_observation_bytes <- 2^20
 
-# For fewer episodes than this no worker processes are used.
+# Fewer episodes than this do not use worker processes.
 few_episodes <- 32L
 
-#' Choose how many sub-environments with seeds of their own an environment gets
+#' Choose the number of sub-environments with their own seeds
 #' @return A power of two, an integer.
 #' @noRd
 count_sub_envs <- function(observation_bytes) {
@@ -23,7 +23,7 @@ count_sub_envs <- function(observation_bytes) {
   as.integer(min(most_sub_envs, max(fewest_sub_envs, room)))
 }
 
-# How much an observation takes on the wire. Only arrays, which may be large, are counted.
+# The size of an observation in a message. Only arrays, which may be large, are counted.
 observation_bytes <- function(space) {
   if (has_parts(space)) {
     sum(vapply(space$spaces, observation_bytes, 0))
@@ -39,7 +39,7 @@ dtype_bytes <- function(dtype) {
   if (is.na(bits)) 1 else bits / 8
 }
 
-# What was found out about an environment, as long as the client lives.
+# What is known about an environment, as long as the client lives.
 known_of_env <- function(client, env_id, arguments) {
   check_client(client)
   state <- client_state(client)
@@ -49,13 +49,13 @@ known_of_env <- function(client, env_id, arguments) {
   state$known_envs[[key]]
 }
 
-#' Make an environment with sub-environments, and without any where the server cannot make them
+#' Make an environment with sub-environments, or without any if the server cannot make them
 #'
-#' @param make A function that makes it, of how many sub-environments and how they are run.
-#' @param described As [known_description()] returns it. A server that does not say how large
-#'   observations are refuses more sub-environments than it can make.
-#' @return A list: `env`, the environment, and `batch_size`, how many episodes make a batch where
-#'   each sub-environment has a seed of its own.
+#' @param make A function that makes it, of the number of sub-environments and how they run.
+#' @param described As returned by [known_description()]. A server that does not report the size of
+#'   observations refuses more sub-environments than it can make.
+#' @return A list: `env`, the environment, and `batch_size`, the number of episodes in a batch if
+#'   each sub-environment has its own seed.
 #' @noRd
 make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call) {
   own_implementation <- isTRUE(described$one_seed)
@@ -68,7 +68,7 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
       return(list(env = own))
     }
   }
-  # Sub-environments with seeds of their own. What has a vector implementation uses no workers.
+  # Sub-environments with their own seeds. A vector implementation does not use workers.
   make_seeded <- function(n, workers) {
     make(
       n, num_workers = workers, autoreset_mode = "SameStep",
@@ -76,8 +76,8 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
     )
   }
   full <- num_envs %||% count_sub_envs(observation_bytes(described$observation_space))
-  # No more sub-environments are made than there are episodes. Without a number the server chooses
-  # the workers.
+  # There are no more sub-environments than episodes. Without a number the server chooses the
+  # workers.
   workers <- num_workers %||% if (max_envs < few_episodes) 0L
   env <- if (!is.null(num_envs)) {
     make_seeded(num_envs, workers)
@@ -90,7 +90,7 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
   list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
 }
 
-# Fewer sub-environments are tried where the server refuses so many.
+# The server may refuse this many; then try fewer.
 counts_to_try <- function(n) {
   unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))
 }
@@ -116,13 +116,13 @@ check_no_workers <- function(num_workers, call) {
   }
 }
 
-# The codes of errors that an environment with fewer sub-environments, or with none, may not have.
+# Codes of errors that may disappear with fewer sub-environments or none.
 fewer_sub_envs_codes <- c(
   "not_supported", "too_many_sub_envs", "too_much_memory", "unsupported_space"
 )
 
-# Evaluates code that makes an environment. NULL where the server cannot make such sub-environments,
-# or not that many.
+# Evaluates code that makes an environment. NULL if the server cannot make such sub-environments, or
+# not that many.
 if_supported <- function(code) {
   tryCatch(
     code,

@@ -1,10 +1,10 @@
 # The info of a vector environment.
 
-#' Turn the info of several sub-environments into R values
+#' Convert the info of several sub-environments to R values
 #'
-#' For each key Gymnasium has an array with an entry for each sub-environment, and beside it, under
-#' the key with `_` before it, a mask of those that have a value. Here the entries of the others are
-#' `NA`, or `NULL` in a list, and there are no masks.
+#' For each key, Gymnasium has an array with an entry for each sub-environment, and under the key
+#' with a `_` before it a mask of those that have a value. Here the other entries are `NA`, or
+#' `NULL` in a list, and there are no masks.
 #' @noRd
 info_by_sub_env <- function(json, n) {
   if (!length(json)) {
@@ -24,7 +24,7 @@ info_of_sub_envs <- function(json, mask, n) {
   if (length(mask) != n || length(json) != n) {
     return(info_from_json(json))
   }
-  # Only the values that the mask picks decide the type: the others are zero or nothing.
+  # Only the values selected by the mask determine the type: the others are zero or nothing.
   values <- info_from_json(json[mask])
   entry <- rep(NA_integer_, n)
   entry[mask] <- seq_len(sum(mask))

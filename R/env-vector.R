@@ -1,16 +1,16 @@
-# Vector environments: how their sub-environments are picked by number or by mask, how they are
-# stepped, and what is checked of both.
+# Vector environments: selecting sub-environments by number or mask, stepping them, and the checks
+# of both.
 
 vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
-# The space of what is sent and received: for a vector environment that of a batch.
+# The space of the values sent and received: for a vector environment that of a batch.
 sent_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Whether values are sent as tensors. Those of a vector environment always are where that is
-# possible; but a safetensors file needs at least one number.
+# Whether values are sent as tensors. Those of a vector environment are if possible, but a
+# safetensors file needs at least one number.
 travels_as_tensors <- function(space, num_envs) {
   if (is.null(num_envs)) {
     tensors_pay(space)
@@ -85,8 +85,8 @@ results_from_json <- function(answer) {
   )
 }
 
-# The last observations of the sub-environments that ended within the step: the numbers of these
-# sub-environments from 1, and a batch of the observations.
+# The last observations of the sub-environments whose episode ended in the step: their numbers from
+# 1, and a batch of the observations.
 final_observations <- function(instance, answer, n, named) {
   ended <- unlist(answer$final_sub_envs)
   check_final_sub_envs(ended, n)
@@ -95,7 +95,7 @@ final_observations <- function(instance, answer, n, named) {
   list(sub_envs = ended + 1L, values = read_final(answer))
 }
 
-# A list: the last observation of each sub-environment that ended, NULL for the others.
+# A list: the last observation of each sub-environment whose episode ended, NULL for the others.
 final_by_sub_env <- function(space, final, n) {
   each <- vector("list", n)
   each[final$sub_envs] <- lapply(seq_along(final$sub_envs), function(i) {
@@ -155,7 +155,7 @@ check_sub_env_seeds <- function(seed, num_envs, call) {
   }
 }
 
-# The mask as JSON. Rollouts send the same one many times.
+# The mask as JSON. Rollouts often send the same one.
 mask_json <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(NULL)

@@ -1,30 +1,28 @@
-# The page on which a server shows an environment, and how people get to it.
+# The page on which a server shows an environment, and how users open it.
 
 #' Watch an environment
 #'
-#' Opens the page on which the server shows an environment live: its picture, the
-#' episode, the step, the return so far and the returns of the last 100 episodes. An
-#' environment that draws no pictures shows its observations. The page is part of
-#' the server; as many people can watch as like to, and each can pause it or slow it down
-#' for themselves.
+#' Open the page on which the server shows an environment live: its picture, the episode, the step,
+#' the return so far and the returns of the last 100 episodes. An environment without pictures shows
+#' its observations. Any number of people can watch, and each can pause it or slow it down for
+#' themselves.
 #'
-#' An environment made with `render_mode = "human"` opens its page by itself, and so does
-#' the first [env_step()] with `render = TRUE`.
+#' An environment made with `render_mode = "human"` opens its page automatically, and so does the
+#' first [env_step()] with `render = TRUE`.
 #'
-#' In an interactive session the page opens in RStudio's viewer, else in the browser; in a script
-#' the address is printed, once an environment, as a message of class `gym_message_watch`.
-#' `options(gym.viewer = )` changes that, in scripts too: a function, such as [utils::browseURL()],
-#' is called with the address, and `FALSE` opens and prints nothing. Where the server asks for a
-#' token, the address holds a key that opens this page and nothing else.
+#' In an interactive session the page opens in RStudio's viewer or else in the browser. A script
+#' shows the address once per environment, as a message of class `gym_message_watch`.
+#' `options(gym.viewer = )` changes this, in scripts too: a function, such as [utils::browseURL()],
+#' is called with the address, and `FALSE` opens and shows nothing. If the server requires a token,
+#' the address contains a key for this page only.
 #'
-#' `vignette("server", package = "gym")`, section "Watching", tells how fast the page moves, and who
-#' can open it.
+#' See `vignette("server", package = "gym")`, section "Watching", for the speed of the page and for
+#' who can open it.
 #'
 #' @inheritParams env_reset
 #' @return The page's address, a string, invisibly.
-#' @section Errors: `gym_error_http_400` for an unknown instance;
-#'   `gym_error_argument` when the option `gym.viewer` is neither a function nor `FALSE`;
-#'   `gym_error_connection`.
+#' @section Errors: `gym_error_http_400` for an unknown instance; `gym_error_argument` if the option
+#'   `gym.viewer` is neither a function nor `FALSE`; `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -37,7 +35,7 @@ env_watch <- function(x, instance_id) {
   open_watch(known_instance(x, instance_id))
 }
 
-# Creates an instance, and opens its page where people want to see it.
+# Creates an instance, and opens its page if the user wants to see it.
 create_and_watch <- function(client, env_id, seed, render_mode, ..., call = rlang::caller_env()) {
   instance_id <- create_instance(client, env_id, seed, render_mode, ..., call = call)
   if (identical(render_mode, "human")) {
@@ -58,7 +56,7 @@ open_watch <- function(instance, call = rlang::caller_env()) {
   address <- paste0(
     instance$client$remote_base, instance$route, "watch/", watch_key(instance, call)
   )
-  # Before the page is opened, so that a viewer that fails does so only once.
+  # Set this first, so that a viewer that fails does so only once.
   instance$shown <- TRUE
   comes <- open_address(address, viewer) && await_watcher(instance)
   if (!comes && !isFALSE(viewer)) {
@@ -69,7 +67,7 @@ open_watch <- function(instance, call = rlang::caller_env()) {
   invisible(address)
 }
 
-# A browser sends no token. Where the server asks for one, the link has a key in its place.
+# A browser sends no token. If the server requires one, the link has a key instead.
 watch_key <- function(instance, call) {
   key <- post_answer(instance$client, paste0(instance$route, "watch/key/"), call = call)$key
   if (!is.null(key) && !(rlang::is_string(key) && grepl("^[A-Za-z0-9_-]{1,200}$", key))) {
@@ -80,9 +78,8 @@ watch_key <- function(instance, call) {
 
 #' Wait until somebody watches
 #'
-#' A browser takes a moment to start, and a fast environment would be past all that there is to
-#' see.
-#' @return Whether somebody does, logical: opening a browser may fail without an error.
+#' A browser takes a moment to start; a fast environment would be finished before that.
+#' @return Whether somebody watches, logical: opening a browser may fail without an error.
 #' @noRd
 await_watcher <- function(instance) {
   deadline <- Sys.time() + watcher_timeout

@@ -1,6 +1,6 @@
-# Environments of a server with wrappers that call functions of R. They are played from R.
+# Environments of a server with wrappers that call R functions. R plays them step by step.
 
-# Wraps an environment that a server has made. It is the same instance.
+# Wraps an environment of a server, which stays the same instance.
 wrap_server_env <- function(env, wrapper, arguments, call) {
   if (!wrapper %in% names(transforms)) {
     gym_abort(
@@ -34,7 +34,7 @@ wrapped_server_env <- R6Class(
       self$single_action_space <- traits$action_space
       private$env <- env
       private$traits <- traits
-      # What an instance is to what only looks at it. Other actions have other meanings.
+      # The wrapped view of the instance, whose actions have other meanings.
       private$instance <- list(
         client = env$client, num_envs = env$num_envs, spec = if (!renames) traits$spec,
         single_action_space = traits$action_space,
@@ -94,7 +94,7 @@ wrapped_server_env <- R6Class(
 
 # By name ----------------------------------------------------------------------------------
 
-#' Divide wrappers into those that the server applies and those that are applied in R after them
+#' Split wrappers into those applied by the server and those applied in R after them
 #' @return A list of two lists, `server` and `r`.
 #' @noRd
 split_wrappers <- function(wrappers, call) {

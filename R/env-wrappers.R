@@ -1,75 +1,71 @@
 #' Wrap an environment before it is made
 #'
-#' Notes a wrapper of Gymnasium's that the environment is to get when
-#' [gym_make()], [env_create()], [rollout()] or [search_random()] make it on the
-#' server: a limit of steps, a scale for its actions, a smaller picture. Three wrappers call a
-#' function of R, such as one that shapes rewards, see below. With the
-#' pipe several are written in the order in which they are applied. Nothing is
-#' made yet. The spaces that R sees are the wrapped environment's. The environment's own limit
-#' of steps stays inside of a `"TimeLimit"`, which can only lower it:
-#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
+#' Add a wrapper of Gymnasium to an environment before [gym_make()], [env_create()], [rollout()] or
+#' [search_random()] makes it on the server: a step limit, a scale for its actions, a smaller
+#' picture. Three wrappers call an R function, for example one that shapes rewards, see below. Use
+#' the pipe to add several, in the order in which they are applied. Nothing is made yet. R sees the
+#' spaces of the wrapped environment. A `"TimeLimit"` can only lower the environment's own step
+#' limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
-#' # Functions of R
+#' # R functions
 #'
-#' These wrappers call your function in each step, around environments of Gymnasium and around those
+#' These wrappers call your function in each step, for environments of Gymnasium and for those
 #' written in R:
-#' * `"TransformReward"`: `func` returns the new rewards. It gets `reward`, and whatever else its
-#'   arguments name of `observation` (on which the action was taken), `action`, `next_observation`,
-#'   `terminated` and `truncated`. The environment's `reward_threshold` is dropped, as it is about
-#'   other rewards.
-#' * `"TransformObservation"`: `func` gets `observation` and returns the new observations;
-#'   `observation_space` is their space, where it is another one.
-#' * `"TransformAction"`: `func` gets `action`, perhaps `observation` as well, and returns the
-#'   actions for the environment; `action_space` is the space of those it gets, where it is another
-#'   one.
+#' * `"TransformReward"`: `func` returns the new rewards. It gets `reward`, and those of
+#'   `observation` (before the action), `action`, `next_observation`, `terminated` and `truncated`
+#'   that are among its arguments. The environment's `reward_threshold` is dropped, because it is
+#'   about the original rewards.
+#' * `"TransformObservation"`: `func` gets `observation` and returns the new observations. Give
+#'   their `observation_space` if it is a different one.
+#' * `"TransformAction"`: `func` gets `action`, and optionally `observation`, and returns the
+#'   actions for the environment. Give the `action_space` of its argument if it is a different one.
 #'
-#' `func` gets batches, also where there is one environment: of rewards a vector, of observations
-#' what a policy gets, such as a matrix with a row for each (see [act()]), and returns as many
-#' values. Its only argument may have any name. It should depend on its arguments alone.
+#' `func` gets batches, even for a single environment: rewards as a vector, observations in the form
+#' for policies, such as a matrix with a row for each (see [act()]). It returns as many values. Its
+#' only argument may have any name. Its result should depend on its arguments only.
 #'
-#' Around Gymnasium's environments R plays step by step (see [rollout()]), which takes longer than
+#' R plays a wrapped environment of Gymnasium step by step (see [rollout()]). This is slower than
 #' playing on the server, and learners of tables play instead of sampling from a model. The server's
-#' wrappers come first, inside. An environment of [gym_make()] can be wrapped, too: the result is
-#' the same instance with other rewards, observations or actions. The classic calls know nothing of
-#' these wrappers.
+#' wrappers are applied first, inside. You can also wrap an environment of [gym_make()]: the result
+#' is the same instance with other rewards, observations or actions. The classic calls ignore these
+#' wrappers.
 #'
 #' # Environments written in R
 #'
-#' An environment made by [gym_env()] or of a class that inherits from [GymEnv] is wrapped at once,
-#' and what comes back is a new environment of the same functions. An id that [gym_register()] made
-#' known is wrapped when it is made. Beside the three above there are seven wrappers for them, with
-#' the arguments and the formulas of Gymnasium's:
-#' * `"TimeLimit"`: `max_episode_steps`, after how many steps an episode is cut off;
-#' * `"ClipAction"`: takes every action of a Box to its bounds;
-#' * `"RescaleAction"`: `min_action` and `max_action`, the bounds of the actions from outside;
-#' * `"RescaleObservation"`: `min_obs` and `max_obs`, the bounds of the observations from outside;
-#' * `"ClipReward"`: `min_reward` and `max_reward`, of which one may be left out;
+#' An environment of [gym_env()] or of a class that inherits from [GymEnv] is wrapped at once; the
+#' result is a new environment with the same functions. An id from [gym_register()] is wrapped when
+#' it is made. In addition to the three above, there are seven wrappers for them, with Gymnasium's
+#' arguments and formulas:
+#' * `"TimeLimit"`: `max_episode_steps`, the number of steps after which an episode is cut off;
+#' * `"ClipAction"`: moves every action of a Box to its bounds;
+#' * `"RescaleAction"`: `min_action` and `max_action`, the new bounds of the actions;
+#' * `"RescaleObservation"`: `min_obs` and `max_obs`, the new bounds of the observations;
+#' * `"ClipReward"`: `min_reward` and `max_reward`, one of which may be missing;
 #' * `"NormalizeObservation"`: `epsilon`, 1e-8 by default; observations minus their mean so far,
 #'   divided by their standard deviation so far;
 #' * `"NormalizeReward"`: `gamma`, 0.99, and `epsilon`, 1e-8 by default; rewards divided by the
 #'   standard deviation so far of their discounted sum.
 #'
-#' The last two remember earlier episodes, those of one [rollout()] or search. In a vectorised
-#' environment they take all sub-environments together, without those whose episode has ended.
+#' The last two remember earlier episodes of the same [rollout()] or search. In a vectorised
+#' environment they use all running sub-environments together.
 #'
-#' @param env_id The environment's id, a string such as `"CartPole-v1"`, or what
-#'   `gym_wrap()` returned for one; an environment written in R; or for a function of R one made by
-#'   [gym_make()].
-#' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. Which there
-#'   are is the server's choice; the error for one that it does not know lists
-#'   them. Their arguments are in
-#'   [Gymnasium's documentation](https://gymnasium.farama.org/api/wrappers/).
-#' @param ... The wrapper's arguments, by name. A vector of length one travels as
-#'   a single value, wrapped in `I()` as a list of one.
-#' @return Of an id, an object of class `gym_wrapped`, which prints in one line: a list of
-#'   `env_id` and `wrappers`. Of an environment, another one.
-#' @section Errors: `gym_error_argument`, also for a wrapper or an argument that there is not for
-#'   environments written in R, and for a wrapper of the server's over one that calls a function of
-#'   R; the server's come when the environment is made, see [env_create()]. `gym_error_wrapper`,
-#'   while it is played, where `func` raises an error (with that error's classes) or returns
-#'   something wrong.
-#' @section Warnings: `gym_warning_wrapper` where `func` gives a row another value when it is alone
-#'   than among others, as `observation[1]` in the place of `observation[, 1]` does.
+#' @param env_id The environment's id, a string such as `"CartPole-v1"`, or the result of
+#'   `gym_wrap()` for one; an environment written in R; or, for a wrapper with an R function, one
+#'   made by [gym_make()].
+#' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. The server decides which are
+#'   allowed; the error for an unknown one lists them. [Gymnasium's
+#'   documentation](https://gymnasium.farama.org/api/wrappers/) describes their arguments.
+#' @param ... The wrapper's arguments, by name. A vector of length one is sent as a single value;
+#'   wrap it in `I()` to send a list of one.
+#' @return For an id, an object of class `gym_wrapped`, which prints in one line: a list of `env_id`
+#'   and `wrappers`. For an environment, another environment.
+#' @section Errors: `gym_error_argument`, also for a wrapper or an argument that does not exist for
+#'   environments written in R, and for a wrapper of the server outside one that calls an R
+#'   function. The server's errors come when the environment is made, see [env_create()]. During
+#'   play, `gym_error_wrapper` if `func` raises an error (with that error's classes) or returns an
+#'   invalid value.
+#' @section Warnings: `gym_warning_wrapper` if `func` gives a row another value alone than among
+#'   others, as `observation[1]` instead of `observation[, 1]` does.
 #' @export
 #' @examples
 #' wrapped <- "CartPole-v1" |>
@@ -126,12 +122,12 @@ with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
   env_id
 }
 
-# The wrappers that gym_wrap() has noted for an id.
+# The wrappers that gym_wrap() has recorded for an id.
 noted_wrappers <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$wrappers
 
 wrapper_names <- function(wrappers) vapply(wrappers, function(wrapper) wrapper[[1L]], "")
 
-# Those of some wrappers whose results depend on earlier episodes.
+# Those of the wrappers whose results depend on earlier episodes.
 remembering <- function(names) {
   as.character(intersect(names, c("NormalizeObservation", "NormalizeReward")))
 }

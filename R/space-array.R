@@ -1,11 +1,11 @@
-# Spaces whose values are arrays of numbers: Box, MultiDiscrete, MultiBinary. Their values are
-# vectors in R, or arrays where there is more than one dimension. Discrete uses the functions for
-# single numbers, too.
+# Spaces whose values are arrays of numbers: Box, MultiDiscrete, MultiBinary. In R their values are
+# vectors, or arrays if there is more than one dimension. Discrete also uses the functions for
+# single numbers.
 
 #' @exportS3Method
 init_space.gym_space_box <- function(space) {
   space$shape <- shape_from_json(space$shape)
-  # Classic servers send no dtype, and their numbers are those of JSON, doubles.
+  # Classic servers send no dtype, and their numbers are JSON's, doubles.
   space$dtype <- space$dtype %||% "float64"
   space$low <- bound_from_json(space$low)
   space$high <- bound_from_json(space$high)
@@ -96,7 +96,7 @@ decode_value.gym_space_array <- function(space, json) {
   shape_values(values, space$shape)
 }
 
-# Returns nested numbers as one vector, of the R type that stands for the dtype.
+# Converts nested numbers to one vector, of the R type for the dtype.
 decode_numbers <- function(dtype, json) {
   switch(dtype,
     float16 = ,
@@ -138,7 +138,7 @@ wanted_shape <- function(shape) {
 }
 
 # The shape of an R value. A vector without dim is one-dimensional, with two exceptions: a number is
-# a scalar where the space's shape is that of a scalar; and where a batch has one number for each
+# a scalar if the space's shape is that of a scalar; and if a batch has one number for each
 # sub-environment, a vector is a column of it.
 value_shape <- function(value, space) {
   if (!is.null(dim(value))) {
@@ -152,9 +152,8 @@ value_shape <- function(value, space) {
   }
 }
 
-# Finds the first number that is not of the space's kind: a missing one, or one with a fraction
-# where they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds
-# refuse.
+# Finds the first number that does not belong to the space: a missing one, or one with a fraction if
+# they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds refuse.
 wrong_number <- function(space, flat) {
   flat <- double_from_integer64(flat)
   if (anyNA(flat)) {
@@ -181,12 +180,12 @@ out_of_bounds <- function(space, flat) {
   }
 }
 
-# Turns the number of an element, counted from 1 and row by row, into its indices, counted from 0.
+# Converts the number of an element, from 1 and row by row, to its indices, from 0.
 unravel <- function(at, shape) {
   if (length(shape) == 0L) integer() else rev(arrayInd(at, rev(shape))) - 1L
 }
 
-# Rounds doubles as a conversion to a smaller dtype does.
+# Rounds doubles like a conversion to a smaller dtype.
 round_to_dtype <- function(x, dtype) {
   switch(dtype,
     float32 = readBin(writeBin(as.double(x), raw(), size = 4L), "double", length(x), size = 4L),
@@ -227,7 +226,7 @@ draw_numbers <- function(dtype, low, high) {
 }
 
 draw_whole <- function(low, high) {
-  # The outermost doubles that bit64 can hold.
+  # The outermost doubles that bit64 can represent.
   low <- pmax(low, -2^63 + 1024)
   high <- pmin(high, 2^63 - 1024)
   width <- high - low
@@ -244,7 +243,7 @@ draw_between <- function(low, high) {
   above <- is.finite(high)
   both <- below & above
   share <- stats::runif(sum(both))
-  # Two products, as high - low may overflow.
+  # Two products, because high - low may overflow.
   values[both] <- low[both] * (1 - share) + high[both] * share
   values[below & !above] <- low[below & !above] + stats::rexp(sum(below & !above))
   values[above & !below] <- high[above & !below] - stats::rexp(sum(above & !below))

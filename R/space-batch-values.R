@@ -1,14 +1,13 @@
-# Batches of values, one for each sub-environment, put together and taken apart. Numbers are in an
-# array whose first dimension counts the sub-environments (in a vector, for single numbers), texts
-# in a character vector, the values of Tuple and Dict in a list of such parts, other values in a
-# list.
+# Put batches of values, one for each sub-environment, together and take them apart. Numbers are an
+# array whose first dimension is the sub-environment (a vector for single numbers), texts a
+# character vector, values of Tuple and Dict a list of such parts, other values a list.
 
 has_parts <- function(space) {
   inherits(space, "gym_space_tuple") || inherits(space, "gym_space_dict")
 }
 
-# Calls a function for each part of a Tuple or Dict, with that part of `values`. A list for a Tuple
-# keeps the names that it has.
+# Calls a function for each part of a Tuple or Dict, with that part of `values`. The list for a
+# Tuple keeps its names.
 map_parts <- function(space, part, values, ...) {
   parts <- Map(part, unname(space$spaces), unname(values), ...)
   names(parts) <- names(space$spaces) %||% names(values)
@@ -32,7 +31,7 @@ batch_of <- function(space, values) {
   }
 }
 
-#' Take one value out of a batch
+#' Take one value from a batch
 #' @noRd
 batch_value <- function(space, batch, i) {
   if (has_parts(space)) {
@@ -48,8 +47,8 @@ batch_value <- function(space, batch, i) {
   }
 }
 
-#' Take some values of a batch, which are a batch again
-#' @param i Their numbers; one may come more than once.
+#' Take some values of a batch as a smaller batch
+#' @param i Their numbers, with or without repetition.
 #' @noRd
 batch_rows <- function(space, batch, i) {
   if (has_parts(space)) {
@@ -73,13 +72,13 @@ rows_of <- function(x, i) {
   }
 }
 
-# The parts in the order of the space: a policy may name those of a Dict in any order.
+# The parts in the order of the space: a policy may return those of a Dict in any order.
 in_order <- function(space, parts) {
   keys <- names(space$spaces)
   if (is.null(keys) || is.null(names(parts))) parts else parts[match(keys, enc2utf8(names(parts)))]
 }
 
-#' Put several batches one after the other
+#' Concatenate several batches
 #' @param each A list of batches, at least one.
 #' @noRd
 bind_batches <- function(space, each) {
@@ -92,7 +91,7 @@ bind_batches <- function(space, each) {
   } else if (!is_stackable(space)) {
     do.call(c, each)
   } else if (any(vapply(each, inherits, NA, "integer64"))) {
-    # Other values may be integer or double, as integer64 stands for the numbers beyond 2^53 only.
+    # Other values may be integer or double, because integer64 is only for numbers beyond 2^53.
     digits <- unlist(lapply(each, function(batch) whole_text(row_major(batch))))
     n <- length(digits) / prod(space$shape)
     shape_values(whole_from_digits(digits), c(n, space$shape))
@@ -108,9 +107,10 @@ bind_batches <- function(space, each) {
   }
 }
 
-#' Put other values in the place of some of a batch
-#' @param n How many values the batch has.
-#' @param i The numbers of those to replace, `values` the batch of what takes their place.
+#' Replace some values of a batch
+#' @param n The number of values in the batch.
+#' @param i The numbers of those to replace.
+#' @param values The batch of their replacements.
 #' @noRd
 replace_rows <- function(space, batch, n, i, values) {
   if (is_stackable(space) && !is.object(batch) && !is.object(values)) {
@@ -151,8 +151,7 @@ sample_batch <- function(space, n) {
 }
 
 #' Put the numbers of each value of a batch into a row of a matrix
-#' @return A matrix, in each row the numbers in row-major order, as Gymnasium flattens
-#'   them.
+#' @return A matrix with numbers in row-major order in each row, as Gymnasium flattens them.
 #' @noRd
 number_rows <- function(batch) {
   if (is_integer64(batch)) {
@@ -168,7 +167,7 @@ number_rows <- function(batch) {
   }
 }
 
-# What is nearly a batch, such as a vector for a matrix of one column, as a batch.
+# Accepts what is almost a batch, such as a vector for a matrix of one column.
 as_batch <- function(space, actions) {
   if (has_parts(space)) {
     complete <- is.list(actions) && length(actions) == length(space$spaces)

@@ -1,14 +1,14 @@
 # Batches, the spaces of several values of a space: one for each sub-environment of a vector
-# environment, or for each element of a Sequence or Graph. Numbers are stacked into one array, with
-# the sub-environments along its first dimension; Tuple and Dict are stacked part by part; texts are
-# a character vector; values without a fixed form are a list.
+# environment, or for each element of a Sequence or Graph. Numbers are stacked into one array, whose
+# first dimension is the sub-environment. Tuple and Dict are stacked part by part. Texts are a
+# character vector. Values without a fixed form are a list.
 
 #' Make the space of several values of a space
 #'
-#' As Gymnasium's `batch_space()`, but a MultiDiscrete remains a MultiDiscrete and a MultiBinary a
-#' MultiBinary, with one dimension more. The bounds are those of one value, which R recycles in
-#' row-major order; [spread_bounds()] repeats them for each value.
-#' @param n How many values.
+#' Like Gymnasium's `batch_space()`, but a MultiDiscrete or MultiBinary space keeps its kind, with
+#' one dimension more. The bounds are those of one value, which R recycles in row-major order;
+#' [spread_bounds()] repeats them for each value.
+#' @param n The number of values.
 #' @noRd
 batch_space <- function(space, n) UseMethod("batch_space")
 
@@ -92,7 +92,7 @@ check_value.gym_space_discretes <- function(space, value, path, call, bounds = F
   }
 }
 
-# Whether all are whole numbers that fit R's integers, none of them missing.
+# Whether all are whole numbers that fit R's integers, without missing values.
 all_small <- function(x) {
   if (is.integer(x)) {
     !is.object(x) && !anyNA(x)
@@ -105,7 +105,7 @@ within_integer <- function(x) {
   isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
 }
 
-# Numbers that fit R's integers are written as int32: writing int64 takes ten times as long.
+# Write numbers that fit R's integers as int32: writing int64 takes ten times as long.
 #' @exportS3Method
 to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") {
   unsigned <- space$dtype == "uint64"
@@ -151,9 +151,10 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 
 #' Check a value for each sub-environment
 #'
-#' All are checked at once, as nearly always they all fit. If they do not they are checked one by
-#' one, so that the error names the sub-environment and shows its value.
-#' @param space The space of one sub-environment, `batch` that of all `n`.
+#' All are checked together, because they usually fit. If they do not, they are checked one by one,
+#' so that the error names the sub-environment and shows its value.
+#' @param space The space of one sub-environment.
+#' @param batch The space of all `n`.
 #' @param sub_envs Their numbers; `NULL` for 1 to `n`.
 #' @param bounds Whether to check against the bounds, too.
 #' @noRd
@@ -228,7 +229,7 @@ batch_length.gym_space_tuple <- function(space, values) {
 #' @exportS3Method
 batch_length.gym_space_dict <- batch_length.gym_space_tuple
 
-# JSON has the values one sub-environment after the other, whatever the space.
+# JSON has the values of one sub-environment after the other, for any space.
 write_batch <- function(space, values, n) {
   sub_envs <- lapply(seq_len(n), function(sub_env) batch_value(space, values, sub_env))
   json_array(vapply(sub_envs, write_value, "", space = space))

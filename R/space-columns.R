@@ -2,9 +2,9 @@
 
 #' Put observations into columns
 #'
-#' The columns of the table of steps, which models are fitted to: where the space has names, these
-#' are the columns', else `obs_1`, `obs_2`, ..., with the keys of a Dict such as `obs_position_1`.
-#' @param values Many observations, as [batch_of()] puts them together.
+#' The columns of the table of steps, which models are fitted to. They have the names of the space,
+#' or otherwise `obs_1`, `obs_2`, ..., with the keys of a Dict such as `obs_position_1`.
+#' @param values Many observations, as returned by [batch_of()].
 #' @return A named list of columns.
 #' @noRd
 observation_columns <- function(space, values) {
@@ -20,7 +20,7 @@ observation_columns <- function(space, values) {
 }
 
 #' Name the numbers of an observation that is an array or a single number
-#' @param space The observation space, `NULL` where it is unknown.
+#' @param space The observation space, `NULL` if it is unknown.
 #' @noRd
 number_names <- function(space, n = prod(space$shape)) {
   if (is.null(space$names)) {
@@ -30,7 +30,7 @@ number_names <- function(space, n = prod(space$shape)) {
   }
 }
 
-# A name that another column of the table of steps has, or may have, gets `obs_` before it.
+# A name that another column of the table of steps has, or may have, gets the prefix `obs_`.
 beside_steps <- function(names) {
   taken <- names %in% c("candidate", "episode", "step", "reward", "terminated", "truncated") |
     grepl("^(action|next|obs)(_|$)", names)
@@ -41,10 +41,10 @@ part_columns <- function(name, parts) paste0(name, "_", parts, recycle0 = TRUE)
 
 #' Put values of a space into columns
 #'
-#' Numbers have a column each, in row-major order; so have the parts of Tuple and
-#' Dict. Values that may hold any number of parts have one column that is a list.
-#' @param values The values, as [batch_of()] puts them together.
-#' @param name What they are, such as `"action"`.
+#' Numbers have a column each, in row-major order; so have the parts of Tuple and Dict. Values with
+#' a variable number of parts have one column that is a list.
+#' @param values The values, as returned by [batch_of()].
+#' @param name Their name, such as `"action"`.
 #' @return A named list of columns.
 #' @noRd
 value_columns <- function(space, values, name) UseMethod("value_columns")
@@ -56,7 +56,7 @@ value_columns.default <- function(space, values, name) stats::setNames(list(I(va
 value_columns.gym_space_array <- function(space, values, name) {
   numbers <- number_rows(values)
   n <- ncol(numbers)
-  # From a matrix of one row and named columns the number would come with its name.
+  # In a matrix of one row with named columns the number would keep its name.
   each <- lapply(seq_len(n), function(i) unname(numbers[, i]))
   parts <- space$names %||% if (n > 1L) seq_len(n)
   stats::setNames(each, if (n == 1L && is.null(parts)) name else part_columns(name, parts))

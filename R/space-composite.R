@@ -1,5 +1,5 @@
-# Spaces that are made of other spaces: Tuple and Dict, whose values have a value of each, and
-# OneOf, whose values have a value of one of them.
+# Spaces composed of other spaces: a value of Tuple or Dict has a value of each of them, a value of
+# OneOf has a value of one of them.
 
 #' @exportS3Method
 init_space.gym_space_tuple <- function(space) {

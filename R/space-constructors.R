@@ -1,13 +1,12 @@
-# Spaces made in R: the constructors check what they are given and write the description that the
-# server would send, so that new_space() makes the same objects of both.
+# Spaces made in R: the constructors check their arguments and write the description that the server
+# would send, so that new_space() makes the same objects from both.
 
 #' Make a space
 #'
-#' A space says what the actions or the observations of an environment are. These functions make
-#' the spaces of an environment that is written in R, see [gym_env()]; those of Gymnasium's
-#' environments come from the server and are the same objects. [space_sample()] draws a value of a
-#' space, [space_contains()] says whether a value belongs to one, and which R values stand for the
-#' values of a space is listed there.
+#' A space describes the actions or the observations of an environment. Use these functions for
+#' environments written in R, see [gym_env()]. The spaces of Gymnasium's environments come from the
+#' server and are the same objects. [space_sample()] draws a value of a space and lists the R values
+#' for each kind; [space_contains()] checks whether a value belongs to a space.
 #'
 #' * `space_box()`: numbers between bounds, such as a position and a velocity.
 #' * `space_discrete()`: one of `n` consecutive whole numbers, such as one of four directions.
@@ -16,29 +15,30 @@
 #' * `space_text()`: a string.
 #' * `space_tuple()`, `space_dict()`: a value of each of several spaces, without and with names.
 #'
-#' @param low,high The bounds of the numbers of a Box, both included. A single number counts for
-#'   all numbers of the Box, otherwise each number has a bound of its own: a vector, or an array
-#'   where the shape has two dimensions or more. `-Inf` and `Inf` stand for no bound. The names of
-#'   `low` (or of `high`, where `low` has none) are the names of the numbers: policies see them as
-#'   column names of the observations, as in `observation[, "position"]`.
-#' @param shape How many numbers there are along each dimension: a vector of whole numbers,
-#'   `integer()` for a single number without dimensions. For a Box the default, `NULL`, takes the
-#'   shape of the bounds: one number where both are single numbers.
-#' @param dtype The type of the numbers, a string. The default, `"float64"`, is what R computes in.
-#'   `"float32"` and `"float16"` are less exact, and the bounds are rounded to them; Gymnasium's
-#'   own default is `"float32"`. The others are `"int8"` to `"int64"`, `"uint8"` to `"uint64"`, for
-#'   whole numbers, and `"bool"`, for `TRUE` and `FALSE`.
-#' @param n How many values there are, a whole number of at least 1.
+#' @param low,high The bounds of the numbers of a Box, both included. A single number applies to all
+#'   numbers of the Box. Otherwise each number has its own bound: a vector, or an array if the shape
+#'   has two dimensions or more. Use `-Inf` and `Inf` for no bound. The names of `low` (or of
+#'   `high`, if `low` has none) are the names of the numbers: policies get them as column names of
+#'   the observations, as in `observation[, "position"]`.
+#' @param shape The size of each dimension: a vector of whole numbers, `integer()` for a single
+#'   number without dimensions. For a Box the default, `NULL`, uses the shape of the bounds: one
+#'   number if both are single numbers.
+#' @param dtype The type of the numbers, a string. The default, `"float64"`, is R's own. `"float32"`
+#'   and `"float16"` are less precise, and the bounds are rounded to them; Gymnasium's own default
+#'   is `"float32"`. The others are `"int8"` to `"int64"`, `"uint8"` to `"uint64"`, for whole
+#'   numbers, and `"bool"`, for `TRUE` and `FALSE`.
+#' @param n The number of values, a whole number of at least 1.
 #' @param start The first value, a whole number. For `space_multi_discrete()` a single one for all
 #'   numbers, or one for each, in the shape of `nvec`.
-#' @param nvec How many values each number has, a vector or an array of whole numbers of at least 1.
-#' @param max_length,min_length How many characters a text has at most and at least.
-#' @param characters Which characters a text may have: a string of them, or a vector of strings of
-#'   one character each. The default is the letters from a to z, capital or not, and the digits.
-#' @param ... Spaces: without names for `space_tuple()`, each with a name of its own for
-#'   `space_dict()`.
-#' @return An object of class `gym_space`, a list whose elements are those that [space_sample()]
-#'   lists for its kind. A Box whose bounds have names has the element `names`, too.
+#' @param nvec The number of values of each number, a vector or an array of whole numbers of at
+#'   least 1.
+#' @param max_length,min_length The largest and smallest number of characters in a text.
+#' @param characters The characters that a text may contain: a string of them, or a vector of
+#'   strings of one character each. The default is the letters from a to z, upper or lower case, and
+#'   the digits.
+#' @param ... Spaces: without names for `space_tuple()`, with different names for `space_dict()`.
+#' @return An object of class `gym_space`, a list with the elements that [space_sample()] lists for
+#'   its kind. A Box whose bounds have names also has the element `names`.
 #' @section Errors: `gym_error_argument`, which names the argument and the value.
 #' @export
 #' @examples
@@ -179,7 +179,7 @@ fits_dtype <- function(x, dtype) {
   }
 }
 
-# A single number counts for all numbers of a Box.
+# A single number applies to all numbers of a Box.
 is_single <- function(x) length(x) == 1L && is.null(dim(x))
 
 # Returns a bound for each number, row by row.
@@ -230,7 +230,7 @@ check_whole_array <- function(x, min, arg = rlang::caller_arg(x), call = rlang::
   }
 }
 
-# Returns the characters as the server writes them: in one string, sorted by their code points.
+# Returns the characters like the server: in one string, sorted by their code points.
 sorted_characters <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   known <- if (rlang::is_string(x)) strsplit(enc2utf8(x), "")[[1L]] else enc2utf8(as.character(x))
   if (!is.character(x) || anyNA(x) || !length(known) || any(nchar(known) != 1L)) {

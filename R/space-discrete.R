@@ -43,7 +43,7 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
   }
 }
 
-# Called in nearly every step: the plain case, the last one, is quick.
+# Called in nearly every step: the usual case, the last one, is fast.
 is_whole <- function(space, value) {
   if (length(value) != 1L || !is.numeric(value)) {
     FALSE

@@ -51,7 +51,7 @@ check_links <- function(space, value, path, call) {
   check_value(links, value$edge_links, path_key(path, "edge_links"), call, bounds = TRUE)
 }
 
-# The space of edge_links: two nodes an edge.
+# The space of edge_links: two nodes per edge.
 stacked_links <- function(edges, nodes) {
   batch_space(
     structure(

@@ -1,11 +1,11 @@
-# The values of a space numbered 1, 2, ..., for tables with a row for each: a Discrete, and what is
-# put together of several.
+# The values of a space numbered 1, 2, ..., for tables with a row for each: a Discrete space, and
+# combinations of several.
 
-#' How many values a space has, and where each stands
+#' Number the values of a space
 #'
-#' @return A list: `count`, a number, and `index`, a function of a batch of values and how many they
-#'   are that returns their numbers, from 1, and `NA` for what is no value of the space. `NULL`
-#'   where the values cannot be counted.
+#' @return A list: `count`, a number, and `index`, a function of a batch of values and their number
+#'   that returns their numbers, from 1, and `NA` for a value outside the space. `NULL` if the
+#'   values cannot be counted.
 #' @noRd
 space_index <- function(space) UseMethod("space_index")
 
@@ -19,7 +19,7 @@ space_index.gym_space_discrete <- function(space) {
   list(count = count, index = function(batch, n) as.integer(beyond_start(batch, start, count)) + 1L)
 }
 
-# How far whole numbers are beyond the first of `n`; NA for what is none of these.
+# The distance of whole numbers from the first of `n`; NA for others.
 beyond_start <- function(x, start, n) {
   if (!is.numeric(x) && !is.logical(x)) {
     return(rep(NA, length(x)))
@@ -82,10 +82,10 @@ parts_index <- function(space) {
   )
 }
 
-#' The rows of a table that belong to observations
+#' Find the rows of a table for observations
 #' @param index The index of their space.
-#' @param n How many observations there are.
-#' @return Their numbers, from 1; what is no value of the space is refused.
+#' @param n The number of observations.
+#' @return Their numbers, from 1; a value outside the space is an error.
 #' @noRd
 rows_of_table <- function(index, space, observation, n, call) {
   row <- index$index(observation, n)
@@ -100,12 +100,11 @@ rows_of_table <- function(index, space, observation, n, call) {
   row
 }
 
-# The numbers of a Discrete's values, in order.
 state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
 
-#' List all values of a space that can be counted
+#' List all values of a countable space
 #' @return A data frame with a row for each, in the order of its numbers, and a column for each
-#'   number of a value, under the name of this part: `state` for a Discrete.
+#'   number of a value, named by its part: `state` for a Discrete space.
 #' @noRd
 all_values <- function(space) {
   columns <- digit_values(space)
@@ -118,12 +117,12 @@ all_values <- function(space) {
   rev(do.call(expand.grid, c(rev(columns), KEEP.OUT.ATTRS = FALSE)))
 }
 
-# A list of the values that each number of a value has.
+# The possible values of each number of a value, a list.
 digit_values <- function(space) {
   if (inherits(space, "gym_space_discrete")) {
     list(state_numbers(space))
   } else if (inherits(space, "gym_space_multidiscrete")) {
-    # Row by row, as its table is.
+    # Row by row, as in its table.
     Map(function(first, n) as.integer(first + seq_len(n) - 1), as.vector(space$start %||% 0),
         as.vector(space$nvec))
   } else if (inherits(space, "gym_space_multibinary")) {
@@ -134,7 +133,7 @@ digit_values <- function(space) {
 }
 
 #' Make a batch of values of a space from the table of their numbers
-#' @param columns A data frame as [all_values()] returns it.
+#' @param columns A data frame as returned by [all_values()].
 #' @noRd
 values_batch <- function(space, columns) {
   if (inherits(space, "gym_space_discrete")) {
@@ -151,7 +150,7 @@ values_batch <- function(space, columns) {
   stats::setNames(batches, space$names %||% names(space$spaces))
 }
 
-# The index of a space that a table is to have rows for.
+# The index of a space for the rows of a table.
 table_index <- function(space, what, call) {
   index <- space_index(space)
   if (is.null(index)) {
@@ -175,5 +174,5 @@ table_index <- function(space, what, call) {
   index
 }
 
-# A table of that many rows and four columns takes a third of a gigabyte.
+# A table with this many rows and four columns takes a third of a gigabyte.
 most_values <- 1e7

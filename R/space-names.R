@@ -1,13 +1,14 @@
-# The names of what is observed. A space may have an element `names`: of a Box of one dimension the
-# names of its numbers, of a Tuple those of its parts, of a Discrete what its number is called in
-# tables. Values get their names once they are read; what reads and writes them needs none.
+# The names of observations. A space may have an element `names`: for a Box of one dimension the
+# names of its numbers, for a Tuple those of its parts, for a Discrete space the name of its number
+# in tables. Values get their names after reading; code that reads and writes them does not need
+# names.
 
-#' Make the function that gives values of a space their names
+#' Make the function that adds names to values of a space
 #'
-#' Made once for an environment, so that each step only sets an attribute.
+#' It is made once for an environment, so that each step only sets an attribute.
 #' @param space The space of one value.
 #' @param batch Whether the function is for batches of values.
-#' @return A function of a value, which returns it with names; `NULL` where values have none.
+#' @return A function of a value, which returns it with names; `NULL` if values have none.
 #' @noRd
 naming <- function(space, batch = FALSE) {
   labels <- space$names

@@ -1,9 +1,9 @@
-# Functions that read and write a space's values, prepared once and called in every step. They take
-# values as they nearly always are; anything else goes the general way, which tells what is wrong
-# with it.
+# Functions that read and write a space's values, prepared once and called in every step. They
+# handle the usual values; anything else takes the general way, which finds what is wrong with it.
 
 #' Make the function that reads a space's values from JSON
-#' @return A function of what was parsed, `NULL` for a value that [decode_value()] must look at.
+#' @return A function of the parsed value, which returns `NULL` for a value that [decode_value()]
+#'   must handle.
 #' @noRd
 json_reader <- function(space) UseMethod("json_reader")
 
@@ -53,7 +53,7 @@ json_reader.gym_space_texts <- function(space) json_reader.default(space)
 # Writers ----------------------------------------------------------------------------------
 
 #' Make the function that checks an action and writes it as a member of a JSON object
-#' @return A function of an action; it returns `NULL` for one that [check_value()] must look at.
+#' @return A function of an action, which returns `NULL` for one that [check_value()] must handle.
 #' @noRd
 json_writer <- function(space) UseMethod("json_writer")
 
@@ -86,9 +86,10 @@ json_writer.gym_space_box <- function(space) {
 
 #' Make the function that checks a batch of actions and puts it into tensors
 #'
-#' @param space The space of one action, `n` the number of actions.
-#' @return A function of a batch; it returns `NULL` for one that [check_batch()] must look at,
-#'   integers as they are, and otherwise a list of tensors.
+#' @param space The space of one action.
+#' @param n The number of actions.
+#' @return A function of a batch. It returns `NULL` for one that [check_batch()] must handle,
+#'   integers unchanged, and otherwise a list of tensors.
 #' @noRd
 tensors_writer <- function(space, n) UseMethod("tensors_writer")
 

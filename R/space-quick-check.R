@@ -1,11 +1,11 @@
-# Quick checks of batches, for values that are checked in every step. Nearly always all values fit,
-# and then nothing needs to be known of the one that does not.
+# Fast checks of batches in every step. Usually all values fit, and then the place of a misfit is
+# not needed.
 
-#' Make a quick check of batches of values of a space
+#' Make a fast check of batches of values of a space
 #'
-#' @return A function of a batch and of how many values it must have, an integer of at least 1. It
-#'   returns `TRUE` where all of them surely belong to the space, bounds included; after `FALSE`
-#'   [check_batch()] has to tell.
+#' @return A function of a batch and of the number of values that it must have, an integer of at
+#'   least 1. It returns `TRUE` if all of them certainly belong to the space, including bounds.
+#'   After `FALSE`, [check_batch()] decides.
 #' @noRd
 quick_check <- function(space) UseMethod("quick_check")
 
@@ -55,7 +55,7 @@ quick_check.gym_space_tuple <- function(space) {
 #' @exportS3Method
 quick_check.gym_space_dict <- quick_check.gym_space_tuple
 
-# Numbers without a class, at least one and none of them missing.
+# Numbers without a class, at least one, without missing values.
 is_plain <- function(x, takes_logical = TRUE) {
   (is.numeric(x) || takes_logical && is.logical(x)) && length(x) > 0L && !is.object(x) && !anyNA(x)
 }
@@ -72,7 +72,7 @@ has_batch_shape <- function(values, n, shape) {
   }
 }
 
-# A comparison with one number for all, where there is one, is quicker by far.
+# Comparing with one number for all, if possible, is much faster.
 quick_bounds <- function(space) {
   each <- prod(space$shape)
   bounds <- lapply(space_bounds(space), function(bound) {

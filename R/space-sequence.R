@@ -1,6 +1,6 @@
 # Sequence: any number of elements of another space. The functions for several elements, which Graph
-# uses, too, stack elements that are numbers into one array, as the values of sub-environments are;
-# other elements are a list.
+# also uses, stack elements that are numbers into one array, like the values of sub-environments.
+# Other elements are a list.
 
 is_stackable <- function(space) {
   inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")

@@ -1,7 +1,7 @@
 # Values of spaces as tensors. Large values are sent as tensors: the time to parse JSON grows with
-# the number of numbers, that to read raw bytes hardly.
+# the number of numbers, the time to read raw bytes hardly does.
 
-# Milliseconds for a whole step, JSON beside tensors, by the numbers in the
+# Milliseconds for a whole step with JSON and with tensors, by the number of numbers in the
 # observation (R 4.2, waitress, two noisy cores; medians of 300, of 30 from 5,000 on):
 #
 #                4   100   200   500  1,000  5,000  28,224  100,800
@@ -12,8 +12,8 @@
 #     JSON     0.9   0.9   1.0   1.2    1.5    5.7    18.2      143
 #     tensors  1.1   1.0   1.1   1.1    1.1    1.3     1.8      3.9
 #
-# An action of float32 takes 1.1 beside 1.4 with 20 numbers, 1.9 beside 1.8 with
-# 200, 3.9 beside 2.3 with 1,000.
+# An action of float32 takes 1.1 as JSON and 1.4 as tensors with 20 numbers, 1.9 and 1.8 with 200,
+# 3.9 and 2.3 with 1,000.
 tensors_pay_from <- 200
 
 # Whether tensors can hold the values: all values of the space must have the same shape.
@@ -65,7 +65,7 @@ part_paths <- function(space, path) {
   }
 }
 
-#' Take a value out of an answer's tensors
+#' Read a value from an answer's tensors
 #' @param answer A list of `tensors` and `texts`, named lists.
 #' @noRd
 from_tensors <- function(space, name, answer) UseMethod("from_tensors")
@@ -92,7 +92,7 @@ from_tensors.gym_space_tuple <- function(space, name, answer) {
 #' @exportS3Method
 from_tensors.gym_space_dict <- from_tensors.gym_space_tuple
 
-#' Put a value that was checked into tensors
+#' Put a checked value into tensors
 #' @return A named list of tensors for [write_tensors()], and strings for texts.
 #' @noRd
 to_tensors <- function(space, value, name, call, path = "") UseMethod("to_tensors")
@@ -107,7 +107,7 @@ to_tensors.default <- function(space, value, name, call, path = "") {
   stats::setNames(list(tensor), name)
 }
 
-# A Discrete is sent as 64 bits, whatever its dtype.
+# A Discrete value is sent as 64 bits, for any dtype.
 #' @exportS3Method
 to_tensors.gym_space_discrete <- function(space, value, name, call, path = "") {
   space$shape <- integer()

@@ -1,4 +1,4 @@
-# Spaces of which a server with the classic protocol sends no more than the name.
+# Spaces of which a server with the classic protocol sends only the name.
 
 # Makes a space from the classic protocol's description, which is complete for these two kinds.
 new_classic_space <- function(description) {

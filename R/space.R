@@ -1,6 +1,6 @@
-# Spaces as R objects: the server's description of a space, with one small method for each kind of
-# space that reads, checks, writes or draws values. The kinds are in the files space-*.R; what they
-# have in common is here.
+# Spaces as R objects: the server's description of a space, with a small method for each kind that
+# reads, checks, writes or draws values. The kinds are in the files space-*.R; this file has the
+# shared part.
 
 #' Make a space from the server's description
 #' @noRd
@@ -27,7 +27,7 @@ init_space.default <- function(space) {
 
 # In words ------------------------------------------------------------------------
 
-# A space in words, without the brackets in which format() puts the outermost space.
+# A space in words, without the brackets that format() adds.
 space_label <- function(space) UseMethod("space_label")
 
 #' @export
@@ -47,83 +47,77 @@ print.gym_space <- function(x, ...) {
 
 # Values --------------------------------------------------------------------------
 
-#' Turn a value of an answer into an R value
-#' @param json The value as [from_json()] returns it.
+#' Convert a value of an answer to an R value
+#' @param json The value as returned by [from_json()].
 #' @noRd
 decode_value <- function(space, json) UseMethod("decode_value")
 
-#' Check a value's type and shape, down to its parts
+#' Check a value's type and shape, including its parts
 #'
-#' Whether a value that is sent lies inside the bounds is checked by the server, which
-#' has the numbers in the space's own dtype.
-#' @param path Where the value lies in the whole, such as `$position[2]`.
+#' The server checks whether a value lies inside the bounds, because it has the numbers in the
+#' space's own dtype.
+#' @param path The place of the value in the whole, such as `$position[2]`.
 #' @param bounds Whether to check against the bounds, too.
 #' @noRd
 check_value <- function(space, value, path, call, bounds = FALSE) UseMethod("check_value")
 
-#' Write a value that was checked as JSON
+#' Write a checked value as JSON
 #' @noRd
 write_value <- function(space, value) UseMethod("write_value")
 
-#' Draw a value of a space, or ask whether a value belongs to it
+#' Draw a value of a space, or check whether a value belongs to it
 #'
-#' `space_sample()` draws a value from R's generator, so that [set.seed()] fixes
-#' it; [env_action_space_sample()] draws on the server. `space_contains()` looks
-#' at type, shape and bounds of a value, all in R and without a server.
+#' `space_sample()` draws a value from R's generator, so [set.seed()] fixes it;
+#' [env_action_space_sample()] draws on the server. `space_contains()` checks type, shape and bounds
+#' of a value. Both work in R without a server.
 #'
-#' A space has the same parts as in Gymnasium, as list elements: `name` and
-#' `dtype`; for Discrete `n` and `start`; for Box `shape`, `low` and `high` (its
-#' bounds, element by element and row by row); for MultiDiscrete `shape`, `nvec`
-#' and `start`; for MultiBinary `shape`; for Text `min_length`, `max_length` and
-#' `characters`; for Tuple, Dict and OneOf `spaces`, a list of spaces, with names
-#' for Dict; for Sequence `space` and `stack`; for Graph `node_space` and
-#' `edge_space`. Bounds of 64-bit integers are doubles, exact up to 2^53. Where the numbers of an
-#' observation (a Box of one dimension), the parts of a Tuple or what a Discrete counts have names,
-#' these are the element `names`, see [gym_make()].
+#' A space has the same parts as in Gymnasium, as list elements: `name` and `dtype`; for Discrete
+#' `n` and `start`; for Box `shape`, `low` and `high` (its bounds, row by row); for MultiDiscrete
+#' `shape`, `nvec` and `start`; for MultiBinary `shape`; for Text `min_length`, `max_length` and
+#' `characters`; for Tuple, Dict and OneOf `spaces`, a list of spaces, with names for Dict; for
+#' Sequence `space` and `stack`; for Graph `node_space` and `edge_space`. Bounds of 64-bit integers
+#' are doubles, exact up to 2^53. The element `names` has the names of the numbers of an observation
+#' (a Box of one dimension), of the parts of a Tuple or of a Discrete value, if there are any, see
+#' [gym_make()].
 #'
 #' # Values in R
 #'
 #' * Discrete: a whole number.
-#' * Box, MultiDiscrete, MultiBinary: a vector; an array where the shape has two
-#'   dimensions or more.
+#' * Box, MultiDiscrete, MultiBinary: a vector; an array if the shape has two dimensions or more.
 #' * Text: a string.
-#' * Tuple: a list; its elements count by their place, whatever names they have. Dict: a list with
-#'   names.
-#' * Sequence: a list of elements; a stacked one of numbers is an array with the
-#'   elements along the first dimension.
-#' * Graph: a list of `nodes`, `edges` (arrays with the first dimension along the
-#'   nodes or edges) and `edge_links` (a matrix of two columns, counting nodes from
-#'   0 as Python does); `edges` and `edge_links` are `NULL` where there are none.
+#' * Tuple: a list, in order; names are ignored. Dict: a list with names.
+#' * Sequence: a list of elements; a stacked one of numbers is an array whose first dimension is the
+#'   element.
+#' * Graph: a list of `nodes`, `edges` (arrays whose first dimension is the node or edge) and
+#'   `edge_links` (a matrix of two columns, counting nodes from 0 as Python does); `edges` and
+#'   `edge_links` are `NULL` if there are none.
 #' * OneOf: a list of the index of the space, counted from 0, and the value.
 #'
-#' The values of several sub-environments have the sub-environment first: a vector of whole numbers
-#' or of strings, an array with a dimension more, a Tuple or Dict of such parts, otherwise a
-#' list; see [env_reset()].
+#' The values of several sub-environments are put together with the sub-environment first: a vector
+#' of whole numbers or of strings, an array with an additional dimension, a Tuple or Dict of such
+#' parts, otherwise a list; see [env_reset()].
 #'
-#' Whole numbers are integer where they all fit, double up to 2^53 and
-#' [bit64::integer64] beyond. The smallest int64, -2^63, is `NA` for bit64, and
-#' uint64 goes on beyond its largest number: such a value is an error, not another
-#' number. A Box of dtype bool is logical; for Discrete, MultiDiscrete and MultiBinary
-#' `TRUE` and `FALSE` may stand for 1 and 0.
+#' Whole numbers are integer if they all fit, double up to 2^53 and [bit64::integer64] beyond. The
+#' smallest int64, -2^63, is `NA` for bit64, and uint64 exceeds its largest number: such a value is
+#' an error. A Box of dtype bool is logical. For Discrete, MultiDiscrete and MultiBinary, `TRUE` and
+#' `FALSE` count as 1 and 0.
 #'
-#' # Where a value is wrong
+#' # The place of a wrong value
 #'
-#' Errors of class `gym_error_space` name the place inside a nested value, such
-#' as `$position[2]`: the element `position`, and in it the number with index 2.
-#' Indices count from 0, as on the server and in Python, so that the same place
-#' has the same name everywhere: in R it is `value$position[3]`. Only the words
-#' "Sub-environment 3" before a message count from 1, as the argument `which` of [env_step()].
+#' Errors of class `gym_error_space` name the place inside a nested value, such as `$position[2]`:
+#' the element `position`, and in it the number with index 2. Indices start at 0, as on the server
+#' and in Python, so that a place has one name everywhere. In R it is `value$position[3]`. Only the
+#' words "Sub-environment 3" before a message count from 1, like the argument `which` of
+#' [env_step()].
 #'
-#' The distributions are Gymnasium's: uniform between two bounds, exponential
-#' from a single one, normal without any; the length of a sequence is geometric.
+#' The distributions are Gymnasium's: uniform between two bounds, exponential with a single one,
+#' normal without any; the length of a sequence is geometric.
 #'
 #' @param space A space, such as `gym_make("CartPole-v1")$action_space`.
-#' @param value The value to look at: anything.
-#' @return `space_sample()` a value as listed above; `space_contains()` `TRUE` or
-#'   `FALSE`.
-#' @section Errors: `gym_error_argument` when `space` is no space;
-#'   `gym_error_space` from `space_sample()` when an integer beyond 2^53 is drawn
-#'   and the package bit64 is not installed.
+#' @param value The value to check: any R object.
+#' @return `space_sample()` returns a value as listed above, `space_contains()` `TRUE` or `FALSE`.
+#' @section Errors: `gym_error_argument` if `space` is not a space. `gym_error_space` from
+#'   `space_sample()` if an integer beyond 2^53 is drawn and the package bit64 is not installed.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1")
