@@ -1,7 +1,7 @@
-# The limit on the size of an answer, so that no server can fill this session's memory.
+# Limits the size of an answer, so that no server can fill this session's memory.
 
-# Room for 5,000 frames of Atari's games, or for some millions of numbers as JSON. R needs up to
-# eight times the bytes of a tensor, and up to seventy times those of JSON.
+# Enough for 5,000 frames of Atari games, or some millions of numbers as JSON. R needs up to eight
+# times the bytes of a tensor, and up to seventy times those of JSON.
 default_answer_bytes <- 2^29
 json_share <- 1 / 16
 
@@ -13,15 +13,14 @@ max_answer_bytes <- function(call = NULL) {
   bytes
 }
 
-# So much is accepted whatever the option says, as reading the option costs time in each call.
+# Answers up to this size are always accepted, because reading the option takes time in each call.
 small_answer <- 2^16
 
-#' Have a handle stop an answer that is too large
+#' Stop a handle if the answer is too large
 #'
-#' Compressed answers are not accepted: how large a few bytes become cannot be known beforehand,
-#' and libcurl decompresses all that has come before it calls `xferinfofunction`, which it does
-#' about ten times in a request.
-#' @param state The client's. Its `too_large` says afterwards whether the request was ended.
+#' Compressed answers are not accepted: their size is unknown in advance, and libcurl decompresses
+#' all received bytes before it calls `xferinfofunction`, about ten times per request.
+#' @param state The client's. Its `too_large` says afterwards whether the request was stopped.
 #' @noRd
 limit_answer_size <- function(handle, state) {
   set_curl(
@@ -30,7 +29,7 @@ limit_answer_size <- function(handle, state) {
     noprogress = FALSE,
     xferinfofunction = function(down, up) {
       down[[2L]] <= small_answer || {
-        # An option that is no number is reported when the request has ended.
+        # An option that is not a number is reported after the request.
         most <- answer_bytes_option()
         state$too_large <- !is_number(most) || down[[2L]] > most
         !state$too_large

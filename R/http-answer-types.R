@@ -1,4 +1,4 @@
-# Checks of the fields of answers: a value of another type is refused, whatever server sent it.
+# Checks of the fields of answers: values of another type are refused, from any server.
 
 abort_answer <- function(problem, call = NULL) {
   gym_abort(
@@ -11,13 +11,13 @@ refuse_field <- function(value, name, must) {
   abort_answer(paste0("Its `", name, "` is ", describe_value(value), ", not ", must))
 }
 
-#' Read an answer's values
+#' Read the values of an answer
 #'
-#' Errors of R's own, which come of answers that are wrong in one of many ways, become an error that
-#' says that it was the answer, and what in it.
+#' A wrong answer can cause various errors in R. They become an error that says what was wrong in
+#' the answer.
 #' @noRd
 read_values <- function(expr, what) {
-  # Each step takes this time: tryCatch() costs three times as much as a calling handler.
+  # This runs in each step: tryCatch() takes three times as long as a calling handler.
   withCallingHandlers(expr, error = function(cnd) {
     if (inherits(cnd, "gym_error_connection")) {
       abort_answer(paste0(what, ": ", cnd$problem))
@@ -50,7 +50,7 @@ number_from <- function(x, name) {
   number_from_json(x)
 }
 
-#' @param result A list of `reward`, `terminated` and `truncated`, an element for each of `n`.
+#' @param result A list of `reward`, `terminated` and `truncated`, with `n` elements each.
 #' @noRd
 check_answer_results <- function(result, n) {
   if (!is.numeric(result$reward) || length(result$reward) != n) {
@@ -70,7 +70,7 @@ check_final_sub_envs <- function(sub_envs, n) {
   }
 }
 
-# Ids are part of an address.
+# Ids become part of an address.
 check_instance_id <- function(id) {
   if (!rlang::is_string(id) || !grepl("^[!-~]{1,100}$", id)) {
     refuse_field(id, "instance_id", "a string of visible characters")
@@ -79,7 +79,7 @@ check_instance_id <- function(id) {
 
 #' Check the description of an instance
 #'
-#' No answer could hold the values of more than 2^24 sub-environments.
+#' No answer could contain the values of more than 2^24 sub-environments.
 #' @noRd
 check_about <- function(about) {
   is_num_envs <- function(x) is_number(x) && are_whole(x, 1, 2^24)
@@ -92,9 +92,9 @@ check_about <- function(about) {
   }
 }
 
-#' Take a column out of the objects that an answer lists
-#' @param is_right,must A function that says whether a value is right; what it must be, in words.
-#' @param missing Stands for a value that is not there.
+#' Get a column from a list of objects in an answer
+#' @param is_right,must A function that checks a value, and its description in words.
+#' @param missing The value for a missing field.
 #' @noRd
 listed_column <- function(listed, name, missing, is_right, must) {
   if (!is.list(listed) || !all(vapply(listed, is_object, NA))) {
@@ -135,7 +135,7 @@ listed_counts <- function(listed, name) {
 
 # Values of spaces ----------------------------------------------------------------
 
-#' Check the numbers that were read for a space
+#' Check the numbers read for a space
 #' @param shape Its shape, or that of several values of it.
 #' @noRd
 check_numbers <- function(values, dtype, shape) {
@@ -145,7 +145,7 @@ check_numbers <- function(values, dtype, shape) {
       "A value of shape ", shape_text(shape), " has ", count_of(length(values), "number")
     ))
   }
-  # NaN is a number. The bits of an integer64 are not to be looked at as those of a double.
+  # NaN is a number. Do not read the bits of an integer64 as a double.
   missing <- !is.object(values) && anyNA(values) && any(is.na(values) & !is.nan(values))
   if (!is.numeric(values) && !is.logical(values) || missing) {
     abort_answer(paste("A value has something that is no", dtype %||% "number"))
@@ -187,7 +187,7 @@ check_frame <- function(values) {
   values
 }
 
-# Checks a PNG file by its header: the pixels that are decoded from it may take much more memory.
+# Checks a PNG file by its header: the decoded pixels may need much more memory.
 check_png <- function(file) {
   signature <- as.raw(c(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a))
   if (!is.raw(file) || length(file) < 24L || !identical(file[1:8], signature)) {
@@ -200,5 +200,5 @@ check_png <- function(file) {
   file
 }
 
-# Width and height stand in the header of the file.
+# The header of the file has width and height.
 png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")

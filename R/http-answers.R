@@ -1,4 +1,4 @@
-# Reading an answer: its JSON or tensors, or the error that it reports.
+# Reads an answer: its JSON or tensors, or the error that it reports.
 
 #' Read an answer or raise the error that it reports
 #' @param response From [with_answer()].
@@ -15,8 +15,8 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer
 }
 
-# A response with its `answer` parsed: `NULL` for none, or one that cannot be read. An error of ours
-# says why that is.
+# A response with its parsed `answer`: `NULL` if there is none or it cannot be read; an error of
+# this package then says why.
 with_answer <- function(response) {
   answer <- tryCatch(
     parsed_body(response),
@@ -26,7 +26,7 @@ with_answer <- function(response) {
   response
 }
 
-# Returns an answer as a list, NULL for an empty one; what cannot be parsed is an error.
+# Returns an answer as a list, NULL for an empty one. An unreadable answer is an error.
 parsed_body <- function(response) {
   if (response$status_code == 204L) {
     NULL
@@ -42,8 +42,8 @@ parsed_body <- function(response) {
   }
 }
 
-# An answer with tensors has the fields of the JSON answer that it replaces, and beside them the
-# tensors and the texts by their names.
+# An answer with tensors has the fields of the JSON answer that it replaces, and also the tensors
+# and texts by their names.
 tensors_answer <- function(bytes, layout) {
   file <- read_tensors(bytes, layout)
   field <- function(name) {
@@ -62,10 +62,10 @@ tensors_answer <- function(bytes, layout) {
 
 empty_object <- structure(list(), names = character())
 
-# Answers to prepared requests, in which only the numbers differ from one to the next ----------
+# Answers to prepared requests, which differ only in their numbers -------------------------------
 
-#' Make the function that reads answers that come as JSON
-#' @param read_answer A function of a parsed answer; it may return `NULL`, or fail.
+#' Make the function that reads answers in JSON
+#' @param read_answer A function of a parsed answer, which may return `NULL` or fail.
 #' @return A function, `read` of [prepare_request()].
 #' @noRd
 new_json_reader <- function(read_answer) {
@@ -79,13 +79,13 @@ new_json_reader <- function(read_answer) {
   }
 }
 
-#' Make the function that reads answers that come as tensors
+#' Make the function that reads answers with tensors
 #'
-#' The layout of the last answer that was read is remembered. Of one of the same layout that says
-#' nothing more than its tensors, these alone are read.
+#' It remembers the layout of the last answer. From an answer with the same layout and no other
+#' content it reads only the tensors.
 #' @param read_answer As for [new_json_reader()].
-#' @param labels The names of the numbers of an observation, `NULL` for none. Where there are some
-#'   the answer's observations have them, and it has `named`.
+#' @param labels The names of the numbers of an observation, `NULL` for none. If there are any, the
+#'   answer's observations get them, and it has `named`.
 #' @noRd
 new_tensors_reader <- function(read_answer, labels) {
   read_json <- new_json_reader(read_answer)
@@ -115,8 +115,8 @@ new_tensors_reader <- function(read_answer, labels) {
   }
 }
 
-# Adds to a layout the names of an observation's numbers, and what comes behind the table in an
-# answer that has an empty info, the idempotency key and nothing more, up to the number of that key.
+# Adds the names of an observation's numbers to a layout, and the bytes after the table, up to the
+# key's number, of an answer with only an empty info and the idempotency key.
 prepare_layout <- function(layout, labels, key) {
   layout$named <- !is.null(labels)
   for (name in intersect(c("observation", "final_obs"), names(layout$entries))) {

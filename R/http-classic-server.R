@@ -1,12 +1,12 @@
-# Servers that know the protocol of gym-http-api alone, as the original one does. They say less
-# about an environment, ignore fields that they do not know, and carry out a repeated request twice.
+# Servers with only the protocol of gym-http-api, such as the original one. They say less about an
+# environment, ignore unknown fields, and execute a repeated request twice.
 
-# A newer server repeats the idempotency key in its answer; `answer` is that to a creation.
+# A newer server repeats the idempotency key in its answer. `answer` is the answer to a creation.
 note_protocol <- function(state, answer) state$classic <- is.null(answer$request)
 
-#' Describe an instance by what the classic protocol has about it
+#' Describe an instance from the data of the classic protocol
 #'
-#' @param missing The server's error, that it has no route for the whole description.
+#' @param missing The server's error that it has no route for the full description.
 #' @return A list like a newer server's answer.
 #' @noRd
 classic_description <- function(client, instance_id, missing, call) {
@@ -24,8 +24,8 @@ classic_description <- function(client, instance_id, missing, call) {
   description
 }
 
-# Splits `done` into `terminated` and `truncated`: the protocol has `done` alone, and environments
-# of its time note in the info that a limit of steps was the reason.
+# Splits `done` into `terminated` and `truncated`: the protocol has only `done`, and environments of
+# its time note in the info that a step limit was the reason.
 classic_flags <- function(answer) {
   done <- isTRUE(answer$done)
   answer$truncated <- done && isTRUE(answer$info[["TimeLimit.truncated"]])
@@ -33,7 +33,7 @@ classic_flags <- function(answer) {
   answer
 }
 
-# Refuses the fields of a request that a newer server takes and a classic one would ignore.
+# Refuses the fields of a request that only newer servers know; a classic one would ignore them.
 check_classic_fields <- function(client, fields, known, call) {
   ignored <- setdiff(names(fields), known)
   if (length(ignored)) {

@@ -1,4 +1,4 @@
-# A client: where a server is, how it is reached, and what the server says of itself.
+# A client: the server's address, its connection, and what the server says about itself.
 
 new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
   structure(
@@ -28,9 +28,9 @@ check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   }
 }
 
-# The settings of a client's connection: its own, and before them those that httr::set_config() has
-# made for the session, as for httr's own verbs. A proxy of the session's would look for a server of
-# this machine on its own.
+# The settings of a client's connection: those made by httr::set_config() for the session, as for
+# httr's own verbs, and then its own. A proxy of the session does not apply to a server on this
+# machine.
 client_config <- function(client) {
   session <- getOption("httr_config", httr::config())
   if (is_loopback(client$remote_base)) {
@@ -39,8 +39,8 @@ client_config <- function(client) {
   c(session, client$config)
 }
 
-# What the server says of itself, a named list; `NULL` where it has no such route, or there is no
-# client. It is asked for once.
+# The server's description of itself, a named list; `NULL` without such a route or without a client.
+# It is requested once.
 server_health <- function(client, call = rlang::caller_env()) {
   if (is.null(client)) {
     return(NULL)
@@ -59,7 +59,7 @@ server_versions <- function(client) {
   tryCatch(server_health(client)$versions, gym_error = function(cnd) NULL)
 }
 
-# Whether the server plays whole episodes by itself. Older ones do not.
+# Whether the server plays whole episodes itself. Older ones do not.
 plays_rollouts <- function(client, call = rlang::caller_env()) {
   isTRUE(server_health(client, call)$rollouts)
 }

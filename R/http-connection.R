@@ -1,16 +1,15 @@
-# A client's connection to its server, and what else the session keeps of a client: idempotency
-# keys, curl's handles, the body that is sent.
+# A client's connection to its server, and the session's data about a client: idempotency keys,
+# curl's handles, the body of the current request.
 
-# What a client holds besides its address: its connection to the server and what it knows of the
-# server's instances. It is made anew when the client finds itself in another process or restored
-# from a file: there the connection is void, and its idempotency keys belong to the original. The
-# handles are made anew when httr::set_config() or httr::reset_config() has changed what the session
-# has.
+# The part of a client besides its address: its connection to the server and what it knows of the
+# server's instances. It is made again if the client is in another process or restored from a file:
+# the connection is then void, and its idempotency keys belong to the original. The handles are made
+# again after httr::set_config() or httr::reset_config().
 client_state <- function(client) {
   state <- client$state
   if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
     # All clients of one server in one process share their keys: the server remembers a limited
-    # number of them for an instance, and a script may make a client for each call.
+    # number for an instance, and a script may make a client for each call.
     place <- paste(client$remote_base, Sys.getpid())
     keys <- the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
     connection <- new_connection(keys)
@@ -36,8 +35,8 @@ client_state <- function(client) {
   state
 }
 
-# Makes a connection: its idempotency keys, the function that performs a request, the body under
-# way, and the handles that were made so far.
+# Makes a connection: its idempotency keys, the function that performs a request, the current body,
+# and its handles.
 new_connection <- function(keys, fetch = curl::curl_fetch_memory) {
   connection <- new.env(parent = emptyenv())
   connection$keys <- keys
@@ -49,7 +48,7 @@ new_connection <- function(keys, fetch = curl::curl_fetch_memory) {
   connection
 }
 
-# The connection for a request inside of another one. R may run a finalizer at any time, also while
+# The connection for a request inside another one. R may run a finalizer at any time, even while
 # curl waits for an answer, and a user's finalizer may make a request.
 inner_connection <- function(connection) {
   while (connection$busy) {
@@ -61,9 +60,9 @@ inner_connection <- function(connection) {
   connection
 }
 
-# Makes a function that does what curl_fetch_memory() does, but in a pool of its own: the one pool
-# of curl_fetch_memory() cannot run inside of itself, and an interrupt can make it unusable. Here
-# interrupts wait until curl has returned, which is up to a second.
+# Makes a function like curl_fetch_memory() with its own pool. The single pool of
+# curl_fetch_memory() cannot run inside itself, and an interrupt can make it unusable. Interrupts
+# are delayed until curl returns, which takes up to a second.
 fetch_in_own_pool <- function() {
   pool <- curl::new_pool()
   function(url, handle) {
@@ -80,7 +79,7 @@ fetch_in_own_pool <- function() {
     })
     repeat {
       state <- suspendInterrupts(curl::multi_run(timeout = 0.1, pool = pool))
-      # An interrupt that has waited comes now.
+      # A delayed interrupt happens here.
       Sys.sleep(0)
       if (!is.null(outcome) || state$pending == 0) break
     }
@@ -91,8 +90,8 @@ fetch_in_own_pool <- function() {
 
 # Idempotency keys ------------------------------------------------------------------
 
-# A source of idempotency keys, by which the server knows a repeated request: a random text, and
-# the number of the last request that was sent with it.
+# A source of idempotency keys, by which the server recognises a repeated request: a random text,
+# and the number of the last request.
 new_idempotency_keys <- function() {
   keys <- new.env(parent = emptyenv())
   keys$key <- random_key()
@@ -100,13 +99,13 @@ new_idempotency_keys <- function() {
   keys
 }
 
-# The idempotency key of the next request, as its field `request` has it.
+# The idempotency key of the next request, for its field `request`.
 next_key <- function(keys) {
   keys$number <- keys$number + 1
   list(key = keys$key, number = keys$number)
 }
 
-# Unlike anything drawn from R's generator this is never the same twice.
+# Unlike R's generator, this never returns the same text twice.
 random_key <- function() {
   the_session$key_count <- (the_session$key_count %||% 0) + 1
   rlang::hash(list(
@@ -119,12 +118,12 @@ random_key <- function() {
 
 json_type <- "application/json"
 tensors_type <- "application/x-safetensors"
-# With the tensors transposed, as R keeps arrays. A server that does not know it answers by rows.
+# With transposed tensors, in R's order. A server that does not know it answers by rows.
 column_tensors_type <- "application/x-safetensors; order=column"
 accepted_tensors <- paste0(column_tensors_type, ", ", tensors_type, ";q=0.9")
 
-# What a request sends and what answer it accepts. Each kind has a handle of its own, on which the
-# headers and the source of the body are set once: setting them costs more than the request.
+# What a request sends and which answers it accepts. Each kind has its own handle, on which the
+# headers and the source of the body are set once: setting them takes longer than the request.
 handle_kinds <- list(
   get = list(post = FALSE, sends = json_type, accepts = json_type),
   get_tensors = list(post = FALSE, sends = json_type, accepts = accepted_tensors),
@@ -133,7 +132,7 @@ handle_kinds <- list(
   send_tensors = list(post = TRUE, sends = tensors_type, accepts = accepted_tensors)
 )
 
-# Makes a connection's handle of one kind: curl's handle, and the length of body that is set on it.
+# Makes a connection's handle of one kind: curl's handle, and the body length set on it.
 add_handle <- function(client, connection, kind) {
   handle <- new.env(parent = emptyenv())
   handle$kind <- kind
@@ -143,11 +142,11 @@ add_handle <- function(client, connection, kind) {
   connection$handles[[kind]] <- handle
 }
 
-# Gives a connection new handles and a pool of its own, and returns the new handle of the same kind.
+# Gives a connection new handles and its own pool, and returns the new handle of the same kind.
 #
-# While curl allocates what it calls our functions with, R may collect garbage, and at the end of
-# that R takes a waiting interrupt: it jumps out of the middle of libcurl. From then on libcurl
-# believes itself within a callback, and refuses every use of curl_fetch_memory()'s pool.
+# R may collect garbage while curl allocates the arguments of our callbacks, and then handle a
+# waiting interrupt, which jumps out of libcurl. After that libcurl believes that it is still in a
+# callback and refuses every use of curl_fetch_memory()'s pool.
 replace_handle <- function(client, connection, handle) {
   connection$fetch <- fetch_in_own_pool()
   connection$handles <- new.env(parent = emptyenv())
@@ -163,9 +162,8 @@ set_body_size <- function(handle, size) {
   })
 }
 
-# Makes the function that curl calls when it wants more of the body. When curl repeats a request by
-# itself it asks for the body a second time. Then nothing is left, and curl fails: only
-# repeat_request() may do that.
+# Makes the function from which curl reads the body. If curl repeats a request itself, it asks for
+# the body a second time, gets nothing and fails: only repeat_request() may repeat.
 body_reader <- function(connection) {
   function(nbytes, ...) {
     if (connection$sent == 0L && length(connection$body) <= nbytes) {
@@ -179,7 +177,7 @@ body_reader <- function(connection) {
   }
 }
 
-# A handle of curl's with the settings of a client, for requests of one kind.
+# A curl handle with the settings of a client, for requests of one kind.
 new_handle <- function(client, kind) {
   config <- client_config(client)
   kind <- handle_kinds[[kind]]
@@ -190,16 +188,16 @@ new_handle <- function(client, kind) {
     connecttimeout_ms = min(10, client$timeout) * 1000,
     timeout_ms = client$timeout * 1000,
     followlocation = FALSE,
-    # Thousands of sub-environments come in few pieces.
+    # Receive the data of thousands of sub-environments in few pieces.
     buffersize = 2^18
   )
   if (is_loopback(client$remote_base) && is.null(config$options$proxy)) {
-    # A proxy that the system names would look for the server on its own machine.
+    # A system-wide proxy would look for the server on its own machine.
     set_curl(handle, noproxy = "*")
   }
   set_curl(handle, .list = config$options)
   limit_answer_size(handle, client$state)
-  # An empty Expect keeps curl from asking for permission before it sends a body.
+  # An empty Expect keeps curl from waiting for permission to send a body.
   headers <- c(
     "Content-Type" = kind$sends, "Accept" = kind$accepts, "Expect" = "",
     "User-Agent" = paste0("gym-R/", utils::packageVersion("gym"))
@@ -213,8 +211,8 @@ new_handle <- function(client, kind) {
     .list = as.list(c(headers[setdiff(names(headers), names(custom))], custom))
   )
   if (Sys.getpid() != the_session$pid) {
-    # curl's open connections belong to the process that was forked: on one of
-    # them a child could read an answer meant for its parent or a sibling.
+    # curl's open connections belong to the parent process: a forked child could read an answer for
+    # its parent or a sibling from them.
     set_curl(handle, fresh_connect = TRUE, forbid_reuse = TRUE)
   }
   handle
@@ -222,8 +220,8 @@ new_handle <- function(client, kind) {
 
 #' Set options of a handle
 #'
-#' As [curl::handle_setopt()], which in a Turkish locale does not find most of them: it makes the
-#' names of all by [tolower()], and there the small letter of "I" has no dot. So its own are passed.
+#' Like [curl::handle_setopt()], which fails in a Turkish locale: it applies [tolower()] to all
+#' names, and there the small letter of "I" has no dot. So this passes curl's own names.
 #' @noRd
 set_curl <- function(handle, ..., .list = list()) {
   options <- c(list(...), .list)

@@ -1,4 +1,4 @@
-# Errors of a call: the server refused it, nobody answered, or what answered is no Gym server.
+# Errors of a call: the server refused it, nobody answered, or the answer is not from a Gym server.
 
 abort_http <- function(response, method, call) {
   status <- response$status_code
@@ -37,20 +37,20 @@ token_hint <- function(code) {
   }
 }
 
-# The server's hints name its routes, as its clients are written in many languages.
+# The server's hints name its routes, because its clients are written in many languages.
 in_r <- function(hint) {
   if (!is.null(hint)) sub("GET /v1/instances/", "`env_list()`", hint, fixed = TRUE)
 }
 
-# How to install an extra that the server lacks. What runs a server of this session's has put a
-# function for that into the server's entry; another server is its operator's affair.
+# How to install a missing extra. The code that starts a server of this session adds a function for
+# that to the server's entry. Other servers are managed by their operators.
 extra_hint <- function(extra, url) {
   server <- the_session$servers[[base_of(url)]]
   if (!is.null(extra) && !is.null(server$extra_hint)) server$extra_hint(extra)
 }
 
-# The server's messages begin in lower case and have no full stop, so that they fit anywhere. After
-# a command that ends in a quote there is no full stop either: it would be copied along.
+# The server's messages start in lower case and without a full stop, so that they fit anywhere. No
+# full stop is added after a quoted command, because people would copy it.
 sentence <- function(text) {
   if (is.null(text)) {
     return(NULL)
@@ -124,7 +124,7 @@ abort_no_answer <- function(response, call) {
   )
 }
 
-# The name by which a program identifies itself in an answer, which is curl's or httr's.
+# The name by which a program identifies itself in an answer, curl's or httr's.
 server_name <- function(response) {
   headers <- response$headers
   if (is.raw(headers)) {
@@ -133,10 +133,10 @@ server_name <- function(response) {
   shown_line(headers[["server"]])
 }
 
-# The statuses by which a proxy reports that the server behind it gave no answer.
+# The statuses by which a proxy reports that the server behind it did not answer.
 proxy_statuses <- 502:504
 
-# The message for a refusal that no Gym server wrote.
+# The message for a refusal from another program.
 foreign_answer_message <- function(response) {
   if (response$status_code %in% proxy_statuses) {
     c("There is a proxy at this address, and the server behind it does not answer.",
@@ -150,9 +150,9 @@ foreign_answer_message <- function(response) {
   }
 }
 
-#' Guess what a program is that is no Gym server, and say what helps
+#' Guess which other program answered, and say what helps
 #' @param url Where it answered.
-#' @param name By which it identifies itself, a string or `NULL`.
+#' @param name The name by which it identifies itself, a string or `NULL`.
 #' @return One or two sentences.
 #' @noRd
 foreign_server_hint <- function(url, name) {

@@ -1,22 +1,22 @@
-# The instances that this session has created on servers. An instance is closed when it is out of
-# use: when its object was collected as garbage, when the call that created it was interrupted, and
-# at the session's end.
+# The instances that this session has created on servers. An instance is closed when it is no longer
+# used: after garbage collection of its object, after an interrupt of the call that created it, and
+# at the end of the session.
 
-# How long closing may take in all, in seconds, where nobody waits for it.
+# The time for closing in total, in seconds, if nobody waits for it.
 closing_time <- 2
 
-#' Create an instance on the server, and remember it
+#' Create an instance on the server and remember it
 #'
-#' An instance may be created although its answer is lost, and then nobody knows its id. So
-#' creations have idempotency keys of their own:
+#' An instance may be created although its answer is lost. Nobody then knows its id. Creations
+#' therefore have their own idempotency keys:
 #'
 #' 1. The request is remembered with its key and body before it is sent.
 #' 2. The server creates the instance; an interrupt or a lost connection comes before the answer.
 #' 3. `outcome` is still "lost": the request is queued for closing, see [end_creation()].
-#' 4. When the next instance is created or reset, or instances are listed, or the session ends, the
-#'    request is repeated. The server does not create another instance; it answers with the id, and
-#'    the instance is closed.
-#' @return The answer, in which the instance's id was checked.
+#' 4. When the next instance is created or reset, when instances are listed, or at the end of the
+#' session, the request is repeated. The server does not create another instance; it answers with
+#' the id, and the instance is closed.
+#' @return The answer, with a checked id.
 #' @noRd
 create_on_server <- function(client, fields, call) {
   state <- client_state(client)
@@ -45,8 +45,8 @@ instance_route <- function(instance_id) {
 }
 
 # A creation whose answer was lost is repeated before the next one, to learn the instance's id and
-# close it. Until then no other request may have the same text in its key, as the server remembers
-# the last number of each only.
+# close it. Until then no other request may use the same text in its key, because the server
+# remembers only the last number of each text.
 end_creation <- function(state, place, outcome) {
   if (outcome == "lost") {
     state$creation_keys <- new_idempotency_keys()
@@ -56,8 +56,8 @@ end_creation <- function(state, place, outcome) {
   }
 }
 
-# Where an instance stands in `the_session$instances`. A creation without an answer stands there
-# under its idempotency key.
+# The place of an instance in `the_session$instances`. A creation without an answer is stored under
+# its idempotency key.
 instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
 
 # `body` is that of a creation that has no answer yet.
@@ -82,7 +82,7 @@ forget_instances_of <- function(base) {
 
 # Closing --------------------------------------------------------------------------
 
-#' Close an instance that nothing in R refers to any more
+#' Close an instance without references in R
 #' @noRd
 close_unused <- function(client, instance_id) {
   if (!is.null(instance_id)) {
@@ -91,8 +91,8 @@ close_unused <- function(client, instance_id) {
   }
 }
 
-# Puts an instance on the list of those to close. A finalizer may do no more, as it may run in the
-# middle of a request.
+# Puts an instance on the list of those to close. A finalizer must not do more, because it may run
+# during a request.
 queue_closing <- function(client, instance_id) {
   place <- instance_place(client, instance_id)
   if (exists(place, envir = the_session$instances, inherits = FALSE)) {
@@ -101,10 +101,10 @@ queue_closing <- function(client, instance_id) {
   }
 }
 
-#' Close the instances that were put on the list since the last time
+#' Close the instances on the list
 #'
-#' What cannot be closed in time is tried again at the session's end only, so that a server
-#' that hangs delays a call once.
+#' Those that cannot be closed in time are tried again only at the end of the session, so that a
+#' server that hangs delays one call only.
 #' @noRd
 close_queued <- function(client) {
   state <- client_state(client)
@@ -115,7 +115,7 @@ close_queued <- function(client) {
   }
 }
 
-# At the session's end. What is on a server of this session's ends with that server.
+# At the end of the session. Instances on the session's own servers end with these.
 close_session_instances <- function(seconds) {
   places <- ls(the_session$instances, all.names = TRUE, sorted = FALSE)
   is_elsewhere <- function(place) {
@@ -124,12 +124,12 @@ close_session_instances <- function(seconds) {
   close_together(Filter(is_elsewhere, places), seconds)
 }
 
-#' Close instances, all at once, in a limited time
+#' Close several instances in a limited time
 #'
-#' It does not use a client's connection, which may be in the middle of a request, repeats nothing,
-#' and does not close one instance after the other, as each may hang. A forked child closes nothing
-#' that its parent created.
-#' @param places Where they stand in `the_session$instances`.
+#' This does not use a client's connection, which may be in use. It repeats nothing, and closes all
+#' instances at the same time, because each may hang. A forked child does not close instances of its
+#' parent.
+#' @param places Their places in `the_session$instances`.
 #' @noRd
 close_together <- function(places, seconds) {
   is_own <- function(place) identical(the_session$instances[[place]]$pid, Sys.getpid())

@@ -1,5 +1,5 @@
-# JSON as it is sent: doubles keep 17 significant digits (jsonlite writes
-# 15), numbers that JSON cannot write travel as "NaN", "Infinity", "-Infinity".
+# JSON for requests: doubles keep 17 significant digits (jsonlite writes 15), and numbers without a
+# JSON form are sent as "NaN", "Infinity", "-Infinity".
 
 json_number <- function(x) {
   if (is.integer(x)) {
@@ -8,7 +8,7 @@ json_number <- function(x) {
     text <- ifelse(x, "true", "false")
   } else {
     text <- with_decimal_point(sprintf("%.17g", x))
-    # "-0" is an integer to most readers, and has no sign.
+    # Most readers take "-0" for an integer without a sign.
     text[text == "-0"] <- "-0.0"
   }
   odd <- !is.finite(x)
@@ -39,7 +39,7 @@ json_escape <- function(x) {
   x
 }
 
-# A JSON object of JSON texts, under names that need no escaping, as a request's fields have.
+# A JSON object from JSON texts whose names need no escaping, such as a request's fields.
 json_object <- function(fields) {
   paste0("{", paste0("\"", names(fields), "\":", fields, recycle0 = TRUE, collapse = ","), "}")
 }
@@ -63,8 +63,8 @@ json_nested <- function(elements, shape) {
 
 #' Write an R value as JSON
 #'
-#' A named list is an object, an unnamed list an array, a vector of length one
-#' a scalar unless wrapped in `I()`, an array is nested row by row.
+#' A named list becomes an object, an unnamed list an array, a vector of length one a scalar unless
+#' it is wrapped in `I()`. An array is nested row by row.
 #' @noRd
 to_json <- function(x) {
   if (is.null(x)) {
@@ -116,24 +116,24 @@ from_json <- function(text) {
   with_decimal_point(jsonlite::parse_json(text, bigint_as_char = TRUE))
 }
 
-# Our server nests spaces up to 100 levels deep, with three brackets a level. The parser would
-# overflow the stack at some ten thousand levels, and what reads the values sooner.
+# Our server nests spaces up to 100 levels deep, with three brackets per level. The parser would
+# overflow the stack at some ten thousand levels, and the code that reads the values earlier.
 deepest_json <- 320L
 
-# Each level opens and closes a bracket, so that a shorter text need not be looked at.
+# Each level opens and closes a bracket, so a shorter text need not be checked.
 check_json_depth <- function(text) {
   if (json_depth(text) > deepest_json) {
     abort_answer(paste("Its JSON is nested more than", deepest_json, "levels deep"))
   }
 }
 
-# How deep a JSON text is nested. It is quick, though rough, where there are few brackets in all.
+# The nesting depth of a JSON text. It is fast and approximate if there are few brackets.
 json_depth <- function(text) {
   steps <- bracket_steps(text)
   if (sum(steps > 0L) <= deepest_json) {
     return(0L)
   }
-  # Brackets in texts nest nothing.
+  # Brackets in texts do not nest.
   if (grepl("\"", text, fixed = TRUE, useBytes = TRUE)) {
     text <- gsub("\"(?:[^\"\\\\]++|\\\\.)*+\"", "", text, perl = TRUE, useBytes = TRUE)
     steps <- bracket_steps(text)
@@ -150,7 +150,7 @@ bracket_steps <- function(text) {
 
 # Refuses the escaped character NUL, but not an escaped backslash before "u0000".
 refuse_nul <- function(text) {
-  # By bytes, as the text may not be UTF-8; the parser refuses that later.
+  # By bytes, because the text may not be UTF-8; the parser refuses that later.
   if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE, useBytes = TRUE)) {
     gym_abort(
       "A text from the server has the character NUL, which no string in R can hold.",
@@ -160,7 +160,7 @@ refuse_nul <- function(text) {
   }
 }
 
-# Returns JSON numbers, nested or not, as a numeric vector; some may be the words for NaN and the
+# Returns JSON numbers, nested or not, as a numeric vector. Some may be the words for NaN and the
 # infinities.
 numbers_from_json <- function(elements) {
   numbers <- unlist(elements, use.names = FALSE)
@@ -181,13 +181,13 @@ number_from_json <- function(x) {
   }
 }
 
-# Integers beyond 2^53 come as text, and so do numbers that are not finite.
+# Integers beyond 2^53 and numbers that are not finite are sent as text.
 is_json_number <- function(x) {
   length(x) == 1L &&
     (is.numeric(x) || is.character(x) && grepl("^(-?[0-9]+|NaN|-?Infinity)$", x))
 }
 
-# Returns whole numbers from JSON, where integers beyond 2^53 came as text.
+# Returns whole numbers from JSON, which has integers beyond 2^53 as text.
 whole_from_json <- function(json) {
   numbers <- unlist(json, use.names = FALSE)
   if (is.character(numbers)) {
@@ -202,8 +202,8 @@ whole_from_json <- function(json) {
   if (is.null(numbers)) integer() else numbers
 }
 
-# Refuses integers that the parser has rounded: those that int64 cannot hold, and the smallest
-# int64. Every other integer beyond 2^53 has come as text.
+# Refuses integers that the parser has rounded: those that int64 cannot represent, and the smallest
+# int64. Other integers beyond 2^53 are text here.
 check_exact <- function(numbers) {
   lost <- abs(numbers) > 2^53
   if (any(lost)) {
@@ -213,9 +213,8 @@ check_exact <- function(numbers) {
 
 # Infos --------------------------------------------------------------------------
 
-# Turns an info from JSON into R values. No space describes an info: arrays of plain values of one
-# kind become vectors, arrays of such arrays that have one shape become arrays, the rest stays a
-# list.
+# Converts an info from JSON to R values. An info has no space: arrays of plain values of one kind
+# become vectors, arrays of such arrays with one shape become arrays, the rest stays a list.
 info_from_json <- function(x, depth = 0L) {
   if (depth > deepest_info) {
     abort_answer(paste("Its info is nested more than", deepest_info, "levels deep"))
@@ -227,7 +226,7 @@ info_from_json <- function(x, depth = 0L) {
   } else if (!is.null(names(x))) {
     lapply(x, info_from_json, depth + 1L)
   } else if (any(vapply(x, is.list, NA))) {
-    # Before the call, which would be on the stack at each level otherwise.
+    # Evaluate this before the call, or it would be on the stack at each level.
     rows <- lapply(x, info_from_json, depth + 1L)
     stack_rows(rows, x)
   } else {
@@ -240,7 +239,7 @@ deepest_info <- 160L
 
 is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
 
-# "NaN" and the like are numbers, unless other text stands beside them.
+# "NaN" and the like are numbers, unless other text is beside them.
 info_vector <- function(x) {
   kinds <- unique(vapply(x, info_kind, ""))
   if (all(kinds %in% c("number", "word"))) {
@@ -266,7 +265,7 @@ info_kind <- function(x) {
   }
 }
 
-# Makes an array of rows that have one shape; `rows` were read from the JSON arrays `json`.
+# Makes an array from rows with one shape. `rows` were read from the JSON arrays `json`.
 stack_rows <- function(rows, json) {
   first <- rows[[1L]]
   shape <- array_shape(first)

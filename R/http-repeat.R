@@ -1,10 +1,10 @@
-# When a request is made again, of one or of several under way, and what becomes of it otherwise.
+# When a request is made again, for one or several at a time, and what happens otherwise.
 
 max_attempts <- 4L
 
 #' Make further attempts at a request
 #' @param failure The connection's error that ended the first attempt.
-#' @return What [attempt_request()] returns, but never a connection's error: that is raised.
+#' @return As [attempt_request()], but a connection's error is raised.
 #' @noRd
 repeat_request <- function(request, connection, handle, key, failure, call) {
   client <- request$client
@@ -50,7 +50,7 @@ timeout_of <- function(client) {
   if (is.null(configured)) client$timeout else configured / 1000
 }
 
-# Raises what ended an attempt from this side: the answer was too large, or the user interrupted.
+# Raises the error of an attempt that this side stopped: a too large answer or an interrupt.
 raise_own_stop <- function(client, reason, call) {
   if (client$state$too_large) {
     abort_too_large(base = client$remote_base, call = call)
@@ -60,9 +60,9 @@ raise_own_stop <- function(client, reason, call) {
   }
 }
 
-# Whether the user was asked and had a server started, at the first request of a client that found
-# nothing listening at its address. Only clients of create_GymClient() ask. The function that asks
-# belongs to an upper floor and is registered by .onLoad().
+# Whether the user was asked and a server was started, at the first request of a client if nothing
+# listens at its address. Only clients of create_GymClient() ask. The function that asks belongs to
+# an upper layer and is registered by .onLoad().
 prompted_server_starts <- function(client, reached, call) {
   state <- client$state
   prompts <- !reached && isTRUE(state$may_prompt)
@@ -70,15 +70,15 @@ prompted_server_starts <- function(client, reached, call) {
   prompts && the_session$prompt_for_server(client, call)
 }
 
-#' Decide whether a request is made again, and when
+#' Decide whether and when to make a request again
 #'
-#' What curl refuses may be repeated in any case as long as it has not asked for the body. A server
-#' with the classic protocol knows no idempotency keys and would do the repeat, too. One that has
-#' too much to do says when to ask again, but a single request does not wait for that.
+#' A request that curl refuses can always be repeated if curl has not asked for the body. A server
+#' with the classic protocol does not know idempotency keys and would execute the repeated request,
+#' too. A busy server says when to ask again, but a single request does not wait for that.
 #' @param outcome The connection's error, or the response.
-#' @param attempt How many attempts were made.
+#' @param attempt The number of attempts made.
 #' @param unsent Whether nothing was sent, as far as is known.
-#' @return After how many seconds, `NULL` where it is not made again.
+#' @return The seconds to wait, `NULL` to give up.
 #' @noRd
 pause_before_next <- function(request, outcome, attempt, unsent = FALSE) {
   if (!inherits(outcome, "error")) {
@@ -91,7 +91,7 @@ pause_before_next <- function(request, outcome, attempt, unsent = FALSE) {
   if (again && attempt < max_attempts) if (refused) 0 else 0.1 * attempt
 }
 
-# A server that has too much to do says when to ask again.
+# A busy server says when to ask again.
 seconds_to_wait <- function(response) {
   if (response$status_code == 429L) {
     header <- curl::parse_headers_list(response$headers)[["retry-after"]]
@@ -100,8 +100,7 @@ seconds_to_wait <- function(response) {
   }
 }
 
-# What libcurl says when an open connection was lost, as opposed to one that could not be made or
-# an answer that took too long.
+# libcurl's messages for a lost connection, as opposed to one that could not be made or a timeout.
 connection_broke <- function(reason) {
   grepl(
     paste(
@@ -114,14 +113,14 @@ connection_broke <- function(reason) {
   )
 }
 
-# What curl_fetch_memory() says when its pool refuses the handle, see replace_handle(). Nothing was
-# sent then. It says the same, though, when waiting in the pool fails, and that may be later.
+# The message of curl_fetch_memory() when its pool refuses the handle, see replace_handle(). Nothing
+# was sent then. But the message is the same if waiting in the pool fails, which may be later.
 curl_refused <- function(reason) {
   grepl("Failed initialization", reason, fixed = TRUE)
 }
 
-# A response as it is; a connection's error where the connection ended within the header: libcurl
-# takes that for the end of an answer without content.
+# A response as it is, or a connection's error if the connection ended within the header: libcurl
+# takes that for an answer without content.
 whole_response <- function(response) {
   end <- as.raw(c(0x0d, 0x0a, 0x0d, 0x0a))
   cut <- !inherits(response, "error") && !length(response$content) &&

@@ -1,17 +1,17 @@
-# Requests. Each is prepared, with what is the same whenever it is made, and performed. A step keeps
-# its prepared request; any other call prepares one and throws it away.
+# Requests: the constant part is prepared and then performed. A step keeps its prepared request;
+# other calls prepare one for a single use.
 
 #' Prepare a request
 #'
 #' @param fields JSON texts of the fields that its body always has, named.
-#' @param body A function of what this body has beside them, and of the idempotency key, see
+#' @param body A function of the other content of a body, and of the idempotency key, see
 #'   [new_json_body()] and [new_tensors_body()].
-#' @param sends_tensors,takes_tensors Whether its body is tensors, and whether those are wanted.
-#' @param once Whether it has an idempotency key, by which the server knows a repeated request.
-#' @param repeatable Whether it may be made again when its connection broke.
-#' @param read A function of a response and the idempotency key that reads an answer as it nearly
-#'   always is. `NULL`, or an error, for any other answer: that is left to `result`.
-#' @param result A function of a parsed answer, which returns the result or says what is wrong.
+#' @param sends_tensors,takes_tensors Whether its body is tensors, and whether the answer may be.
+#' @param once Whether it has an idempotency key, by which the server recognises a repeated request.
+#' @param repeatable Whether it may be made again if its connection broke.
+#' @param read A function of a response and the idempotency key that reads the usual kind of answer.
+#'   For any other answer it returns `NULL` or fails, and `result` handles it.
+#' @param result A function of a parsed answer, which returns the result or raises an error.
 #' @noRd
 prepare_request <- function(client, route, method = "POST", fields = NULL,
                             body = new_json_body(fields), sends_tensors = FALSE,
@@ -31,16 +31,16 @@ prepare_request <- function(client, route, method = "POST", fields = NULL,
 
 #' Perform a request
 #'
-#' All requests of a client go through here, but for those of which several are under way at once.
-#' One whose connection broke is made again where it is repeatable, with the same idempotency key.
+#' All requests of a client use this function, except for several at a time. A repeatable request
+#' whose connection broke is made again with the same idempotency key.
 #' @param request From [prepare_request()].
-#' @param content What this body has beside the request's fields.
+#' @param content The other content of this body, besides the request's fields.
 #' @param key The idempotency key, a list of `key` and `number`; by default the connection's next.
-#' @return What `read` or `result` of the request return.
+#' @return The result of `read` or `result` of the request.
 #' @noRd
 perform_request <- function(request, content = NULL, call = rlang::caller_env(), key = NULL) {
-  # The content may come of a request, as in env_step(x, id, env_action_space_sample(x, id)): that
-  # is made first, while the connection is free.
+  # The content may come from another request, as in env_step(x, id, env_action_space_sample(x,
+  # id)). Make that one first, while the connection is free.
   force(content)
   client <- request$client
   connection <- client_state(client)$connection
@@ -74,7 +74,8 @@ perform_request <- function(request, content = NULL, call = rlang::caller_env(),
 
 #' Make one attempt at a request
 #'
-#' @return What `read` of the request returns. Where that is nothing, something with the attribute
+#' @return The result of `read` of the request. If there is none, an object with the attribute
+#'   "unread", which is the response or the connection's error.
 #'   "unread", which is the response or the connection's error.
 #' @noRd
 attempt_request <- function(request, connection, handle, key) {
@@ -82,7 +83,7 @@ attempt_request <- function(request, connection, handle, key) {
   state$too_large <- FALSE
   connection$sent <- 0L
   response <- NULL
-  # Looked at, it returns from this function. tryCatch() would take three times as long.
+  # Evaluating it returns from this function. tryCatch() would take three times as long.
   delayedAssign("leave", return(structure(list(), unread = whole_response(response))))
   withCallingHandlers(
     {
@@ -94,7 +95,7 @@ attempt_request <- function(request, connection, handle, key) {
       if (is.null(response)) response <<- cnd
       leave
     },
-    # Newer versions of curl signal an interrupt when an answer was stopped for its size.
+    # Newer versions of curl signal an interrupt if an answer was stopped because of its size.
     interrupt = function(cnd) {
       if (state$too_large && is.null(response)) {
         response <<- simpleError("Too large")
@@ -118,8 +119,8 @@ get_answer <- function(client, route, takes_tensors = FALSE, call = rlang::calle
   )
 }
 
-#' Make a request whose answer may be anything
-#' @return What [curl::curl_fetch_memory()] returns, whatever the status, with the parsed `answer`.
+#' Make a request and return any response
+#' @return As [curl::curl_fetch_memory()], for any status, with the parsed `answer`.
 #' @noRd
 any_response <- function(client, route, method = "POST", call = rlang::caller_env()) {
   read <- function(response, key) {
@@ -130,14 +131,13 @@ any_response <- function(client, route, method = "POST", call = rlang::caller_en
 
 # Bodies ---------------------------------------------------------------------------------
 
-# Of a prepared request only little changes from one time to the next: the idempotency key's number,
-# and what is given as content.
+# Bodies of a prepared request differ only in the idempotency key's number and the content.
 
-#' Make the function that writes a body of JSON
+#' Make the function that writes a body in JSON
 #'
 #' @param fields JSON texts of the fields that it always has, named.
-#' @return A function of the members of a JSON object, each with a comma after it, and of the
-#'   idempotency key, which returns a raw vector. Without a key there are the fields alone.
+#' @return A function of the members of a JSON object, each followed by a comma, and of the
+#'   idempotency key, which returns a raw vector. Without a key it has the fields only.
 #' @noRd
 new_json_body <- function(fields) {
   of_key <- ending <- NULL
@@ -155,11 +155,11 @@ new_json_body <- function(fields) {
   }
 }
 
-# curl needs the length of a body beforehand, and setting it costs as much as half a request: small
-# bodies are padded to one length. Blanks at the end of a JSON text mean nothing.
+# curl needs the length of a body in advance, and setting it takes as long as half a request: small
+# bodies are padded to one length. Blanks at the end of a JSON text are ignored.
 json_blanks <- rep(as.raw(0x20), 256L)
 
-# Each member with a comma after it.
+# Each member followed by a comma.
 json_members <- function(fields) {
   if (length(fields)) paste0("\"", names(fields), "\":", fields, ",", collapse = "") else ""
 }
@@ -168,21 +168,21 @@ key_json <- function(key) sprintf('{"key":"%s","number":%.0f}', key$key, key$num
 
 #' Make the function that writes a body of tensors
 #'
-#' @param n How many integers are sent where the content is integers.
-#' @return A function as that of [new_json_body()]. Its content is a list as [to_tensors()] returns
-#'   it, or integers, the tensor "action".
+#' @param n The number of integers, if the content is integers.
+#' @return A function like that of [new_json_body()]. Its content is a list as returned by
+#'   [to_tensors()], or integers, the tensor "action".
 #' @noRd
 new_tensors_body <- function(fields, n = NULL) {
   of_integers <- if (!is.null(n)) {
     write_table(list(action = list(dtype = "I32", shape = n, bytes = raw(4 * n))))
   }
-  # All that stands before the tensors, split at the number of the idempotency key. It is kept as
-  # long as that has as many digits.
+  # The bytes before the tensors, split at the number of the idempotency key. They are kept as long
+  # as the number of digits does not change.
   parts <- NULL
   function(content, key) {
     integers <- is.integer(content)
     if (!integers && any(texts <- vapply(content, is.character, NA))) {
-      # They stand among the metadata, so that the header is another one each time.
+      # These are among the metadata, so the header differs each time.
       fields <- c(fields, texts = to_json(content[texts]), request = key_json(key))
       return(write_tensors(content[!texts], fields))
     }
@@ -203,7 +203,7 @@ new_tensors_body <- function(fields, n = NULL) {
   }
 }
 
-# From this number on integers are put behind a header as integers: R joins them faster than bytes.
+# From this number on the header and integers are joined as integers, which R does faster.
 join_as_integers <- 1024L
 
 split_header <- function(fields, table, key, digits) {

@@ -1,16 +1,16 @@
-# Requests of which several are under way at once: while the server works on one, R reads the answer
-# to another. When the call ends, by an interrupt or an error, too, the connections of those under
-# way are dropped, by which the server knows that nobody wants their answers.
+# Several requests at a time: while the server works on one, R reads the answer to another. When the
+# call ends, also by an interrupt or an error, the open connections are dropped, which tells the
+# server that nobody wants their answers.
 
-#' Perform a request several times, some at once
+#' Perform a request several times, some at the same time
 #'
 #' @param request A POST from [prepare_request()].
-#' @param next_content A function that returns what is sent next, a list whose `body` is the
-#'   request's content; `NULL` when there is nothing for now.
-#' @param received A function of what was sent, its response with the parsed `answer`, and the
-#'   seconds that it took. It is called once for each, in the order in which answers come, and
-#'   returns whether to end.
-#' @param at_once How many are under way at most.
+#' @param next_content A function that returns the next message, a list whose `body` is the
+#'   request's content; `NULL` if there is nothing to send now.
+#' @param received A function of the message, its response with the parsed `answer`, and the seconds
+#'   that it took. It is called once for each, in the order of the answers, and returns whether to
+#'   end.
+#' @param at_once The largest number of open requests.
 #' @noRd
 perform_several <- function(request, next_content, received, at_once = 2L,
                             call = rlang::caller_env()) {
@@ -43,7 +43,7 @@ perform_several <- function(request, next_content, received, at_once = 2L,
   }
 }
 
-# Hands over the responses that have come. Returns whether to end.
+# Passes on the responses that have arrived. Returns whether to end.
 hand_over <- function(several, received) {
   for (one in Filter(has_outcome, several$under_way)) {
     response <- take_response(one, several)
@@ -67,7 +67,7 @@ send_one <- function(one, several) {
     handle <- idle[[1L]]
   } else {
     handle <- new_handle(several$client, request$kind)
-    # Whether the server still works is asked after `timeout`, see check_silent().
+    # After `timeout`, check_silent() asks whether the server still works.
     set_curl(handle, timeout_ms = 0, tcp_keepalive = TRUE)
   }
   one$sent <- one$heard <- now()
@@ -81,7 +81,7 @@ send_one <- function(one, several) {
   })
 }
 
-# Puts a POST into a pool of curl's.
+# Adds a POST to a curl pool.
 start_post <- function(handle, url, body, pool, done, fail) {
   set_curl(handle, url = url, postfieldsize = length(body), postfields = body)
   curl::multi_add(handle, done = done, fail = fail, pool = pool)
@@ -93,14 +93,14 @@ free_handle <- function(one, several) {
   one$handle <- NULL
 }
 
-# Lets curl do what it can do at once, and then waits until there is more. curl would wait for whole
-# seconds, and use up a core that the server needs.
+# Lets curl do what it can do at once and then waits for more. curl would wait for whole seconds,
+# using a core that the server needs.
 await_outcomes <- function(several) {
   pool <- several$line$pool
   state <- several$client$state
   state$too_large <- FALSE
-  # Newer versions of curl signal an interrupt when an answer was stopped for its size, which R
-  # takes some moments later.
+  # Newer versions of curl signal an interrupt if an answer was stopped because of its size, which R
+  # handles some moments later.
   tryCatch(
     {
       suspendInterrupts(curl::multi_run(timeout = 0, pool = pool))
@@ -125,7 +125,7 @@ await_outcomes <- function(several) {
   check_silent(several)
 }
 
-# However long a request takes, a server that works answers another one.
+# A request may take long, but a working server answers another one.
 check_silent <- function(several) {
   for (one in several$under_way) {
     if (is.null(one$outcome) && now() - one$heard > timeout_of(several$client)) {
@@ -135,8 +135,8 @@ check_silent <- function(several) {
   }
 }
 
-#' Take the response to a request that has ended
-#' @return The response, with its `answer` parsed; `NULL` where the request is to be sent again.
+#' Take the response to a finished request
+#' @return The response, with its parsed `answer`; `NULL` if the request is to be sent again.
 #' @noRd
 take_response <- function(one, several) {
   outcome <- whole_response(one$outcome)

@@ -1,4 +1,4 @@
-# The header of a safetensors file, which says what lies where. What does not add up is refused.
+# The header of a safetensors file, which locates the tensors. Inconsistent headers are refused.
 
 header_size <- function(bytes) {
   if (length(bytes) < 8L) {
@@ -11,21 +11,21 @@ header_size <- function(bytes) {
   size[[1L]]
 }
 
-# A table may have so many bytes, as in a request to our server: that is room for some ten thousand
-# tensors, which take some seconds to read.
+# The largest table in bytes, as in a request to our server: enough for some ten thousand tensors,
+# which take some seconds to read.
 max_table_bytes <- 2^20
 
-# Marks where the metadata begin: elsewhere, in names and texts, quotes are escaped.
+# The start of the metadata: elsewhere, in names and texts, quotes are escaped.
 metadata_key <- ",\"__metadata__\":"
 
 #' Read the header of a file
 #'
 #' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
 #'   are in R's order.
-#' @return What all files of one layout have in common, a list: `start`, the bytes with which they
-#'   begin, up to the metadata where these come last, as our server puts them; `entries`, the
-#'   tensors in the order in which they lie; `data`, how many bytes come before these; `total`, how
-#'   many there are in all; `metadata_last`; and `metadata`, where they do not come last.
+#' @return The common part of all files with one layout, a list: `start`, their first bytes, up to
+#'   the metadata if these are last, as in our server's files; `entries`, the tensors in the order
+#'   of their bytes; `data`, the number of bytes before these; `total`, the number of all bytes;
+#'   `metadata_last`; and `metadata`, if they are not last.
 #' @noRd
 read_layout <- function(bytes, by_column = FALSE) {
   data <- 8L + header_size(bytes)
@@ -76,8 +76,8 @@ check_entry_names <- function(names) {
   }
 }
 
-# Returns the order in which tensors lie. Those that lie over one another would take more memory
-# than the file, so they must fill the data, one after the other.
+# Returns the order of the tensors. Overlapping tensors would take more memory than the file, so
+# they must fill the data, one after the other.
 check_filled <- function(begins, ends) {
   in_order <- order(begins, ends)
   wrong <- match(FALSE, begins[in_order] == c(0, ends[in_order])[seq_along(begins)])
@@ -106,7 +106,7 @@ read_entry <- function(entry, by_column) {
   if (size != n * type$size) {
     abort_tensors("an offset does not fit its tensor")
   }
-  # R takes a part of a vector by integers in less time than by doubles.
+  # R indexes a vector faster by integers than by doubles.
   whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
   place_entry(list(
     read = type$read, n = n, shape = as.integer(shape), by_column = by_column,
@@ -114,9 +114,9 @@ read_entry <- function(entry, by_column) {
   ))
 }
 
-#' Decide how the numbers of a tensor are put into their places
+#' Decide how to give a tensor's numbers their shape
 #' @param labels The names of the numbers in a row, `NULL` for none.
-#' @return The entry with `attributes`, where these are enough, or with `place`, a function of the
+#' @return The entry with `attributes`, if these are enough, or with `place`, a function of the
 #'   numbers.
 #' @noRd
 place_entry <- function(entry, labels = NULL) {
@@ -134,7 +134,7 @@ place_entry <- function(entry, labels = NULL) {
   entry
 }
 
-# Returns the elements of a JSON array of whole numbers from 0 on, NULL for anything else.
+# Returns the elements of a JSON array of whole numbers of at least 0, NULL for anything else.
 naturals_from_json <- function(elements) {
   is_number <- function(x) is.numeric(x) && length(x) == 1L
   if (!is.list(elements) || !is.null(names(elements)) || !all(vapply(elements, is_number, NA))) {

@@ -7,14 +7,14 @@
 #' Read a safetensors file
 #'
 #' @param bytes A raw vector.
-#' @param layout That of the file, from [read_layout()].
+#' @param layout The file's layout, from [read_layout()].
 #' @return A list of `tensors`, a named list of vectors and arrays, and `metadata`, a named list of
 #'   strings.
 #' @noRd
 read_tensors <- function(bytes, layout = read_layout(bytes)) {
   metadata <- layout$metadata
   if (layout$metadata_last) {
-    # What follows the start of a header, to its end.
+    # The header after its start.
     text <- rawToChar(bytes[(length(layout$start) + 1L):layout$data])
     metadata <- tryCatch(
       from_json(paste0("{\"last\":", text))$last,
@@ -24,8 +24,8 @@ read_tensors <- function(bytes, layout = read_layout(bytes)) {
   list(tensors = read_entries(bytes, layout), metadata = metadata)
 }
 
-# Up to this size tensors are taken out by an index, from a larger file by a connection of R's,
-# which copies the file once, in much less time for each byte.
+# Up to this size tensors are read by an index, from a larger file by a connection of R, which
+# copies the file once and is then much faster per byte.
 index_up_to <- 8192L
 
 read_entries <- function(bytes, layout) {
@@ -61,7 +61,7 @@ read_entries <- function(bytes, layout) {
   entries
 }
 
-# Bytes become integers once they are in their places.
+# Bytes become integers after reordering.
 place_by_row <- function(values, shape, labels = NULL) {
   if (is.raw(values)) {
     array(as.integer(shape_values(values, shape)), shape, labels)
@@ -74,7 +74,7 @@ place_by_row <- function(values, shape, labels = NULL) {
 
 # The types -----------------------------------------------------------------------
 
-# Each takes bytes and returns the numbers as they come.
+# Each function takes bytes and returns numbers in the same order.
 
 read_double <- function(size) {
   function(bytes, n) readBin(bytes, "double", n, size = size, endian = "little")
@@ -86,7 +86,7 @@ read_integer <- function(size, signed = TRUE) {
   }
 }
 
-# Bytes remain bytes until they are in their places: they are a fourth of the size of integers.
+# Bytes stay bytes until they are reordered: they are a fourth of the size of integers.
 read_byte <- function(bytes, n) bytes
 
 # The bits of the smallest int32 are R's NA.
@@ -130,7 +130,7 @@ write_int64 <- function(x) bytes_of_whole(x)
 
 tensor_type <- function(size, read, write) list(size = size, read = read, write = write)
 
-# By the name in a header: how many bytes a number has, how it is read and written.
+# By the name in a header: the bytes of a number, and the functions that read and write it.
 tensor_types <- list(
   F64 = tensor_type(8L, read_double(8L), write_double(8L)),
   F32 = tensor_type(4L, read_double(4L), write_double(4L)),
@@ -146,7 +146,7 @@ tensor_types <- list(
   BOOL = tensor_type(1L, read_bool, write_byte)
 )
 
-# Halves: 1 bit of sign, 5 of exponent, 10 of fraction.
+# Half precision: 1 bit of sign, 5 of exponent, 10 of fraction.
 double_from_half <- function(bits) {
   exponent <- bits %/% 1024L %% 32L
   fraction <- bits %% 1024L
@@ -159,9 +159,9 @@ half_from_double <- function(x) {
   x <- as.double(x)
   size <- abs(x)
   exponent <- pmax(floor(log2(size)), -14)
-  # log2() may be a whole number too large just below a power of two.
+  # log2() may be rounded up to the next whole number just below a power of two.
   exponent <- exponent - (size < 2^exponent & exponent > -14)
-  # round() takes the even neighbour, as floating-point numbers want it.
+  # round() takes the even neighbour, as floating-point numbers require.
   bits <- round(size / 2^(exponent - 10)) + (exponent + 14) * 1024
   bits[bits > 31744 | is.infinite(x)] <- 31744
   bits[is.nan(x)] <- 32256
@@ -176,8 +176,8 @@ half_from_double <- function(x) {
 #' @param tensors A named list of tensors, each a list of `dtype` (as in
 #'   `tensor_types`), `shape` and `bytes`.
 #' @param metadata A named character vector of JSON texts.
-#' @return A raw vector. The header is filled up with blanks, so that bodies of
-#'   one layout have one length as a rule.
+#' @return A raw vector. The header is padded with blanks, so that bodies of one layout usually have
+#'   one length.
 #' @noRd
 write_tensors <- function(tensors, metadata) {
   do.call(c, c(
@@ -196,7 +196,7 @@ tensors_header <- function(metadata, table) {
   c(length_bytes, header)
 }
 
-# The header's table of tensors that was written last: from step to step it is the same.
+# The last table of tensors written: from step to step it is the same.
 written <- new.env(parent = emptyenv())
 
 tensors_table <- function(tensors) {

@@ -1,10 +1,10 @@
 # The token that a server requires. It is sent in one header and appears nowhere else: it is not
 # printed, and not kept in errors or deparsed code.
 
-#' Keep a token where it is not seen by accident
+#' Hide a token from accidental display
 #' @param text The token, a string, or `NULL`.
 #' @return A function without arguments that returns the token, or `NULL`. Printing, formatting or
-#'   deparsing a function shows its code only.
+#'   deparsing a function shows only its code.
 #' @noRd
 new_token <- function(text) {
   if (is.null(text)) {
@@ -25,9 +25,9 @@ format.gym_token <- function(x, ...) "<token>"
 
 token_variable <- "GYM_SERVER_TOKEN"
 
-#' Check a token as a script gives it
-#' @param token A string; `NULL` and `""` stand for no token.
-#' @return What [new_token()] returns.
+#' Check a token given by a script
+#' @param token A string; `NULL` and `""` mean no token.
+#' @return As [new_token()].
 #' @noRd
 as_token <- function(token, call = rlang::caller_env()) {
   hide_token(token)
@@ -35,7 +35,7 @@ as_token <- function(token, call = rlang::caller_env()) {
     return(NULL)
   }
   token <- if (rlang::is_string(token)) trimws(token)
-  # Other characters could end the header, or begin another one.
+  # Other characters could end the header or start another one.
   if (is.null(token) || !grepl("^[!-~]+$", token)) {
     gym_abort(
       c(
@@ -50,7 +50,7 @@ as_token <- function(token, call = rlang::caller_env()) {
   new_token(token)
 }
 
-# The token that the environment variable holds.
+# The token in the environment variable.
 variable_token <- function(call = rlang::caller_env()) as_token(Sys.getenv(token_variable), call)
 
 # The token of a server that this session started with these options: the server reads the same
@@ -63,12 +63,12 @@ server_token <- function(options, call = rlang::caller_env()) {
   }
 }
 
-# Whether options, or the variable, say which token a server asks for, or that it asks for none.
+# Whether options, or the variable, set a server's token, or that it requires none.
 says_token <- function(options) {
   !is.null(options$token_file) || isTRUE(options$no_auth) || nzchar(Sys.getenv(token_variable))
 }
 
-# The token for an address: that of a server which this session started, else the variable's.
+# The token for an address: that of a server started by this session, otherwise the variable's.
 known_token <- function(base, call = rlang::caller_env()) {
   server <- the_session$servers[[base]]
   if (is.null(server)) variable_token(call) else server$token

@@ -1,10 +1,10 @@
 # Bundles: everything that an installation downloads, in a folder for machines without a network.
 #
-# bundle.dcf the manifest: the system, lock, extras and Python that it is for
+#   bundle.dcf   the manifest: the system, lock, extras and Python that it is for
 #   SHA256SUMS   all other files with their SHA-256
 #   uv           uv itself (uv.exe)
 #   cache/       uv's cache, with the packages
-#   python/      the archive of the Python that uv installs, when it could be downloaded
+#   python/      the archive of the Python that uv installs, if it could be downloaded
 
 #' Fill a folder for installing without a network
 #'

@@ -2,8 +2,8 @@
 # servers of sessions with another package version keep running.
 #
 #   <cache>/gym/<lock's hash>/venv        the environment
-# /installed its manifest, written when it is complete: the extras;
-# the file's time is the last start of a server
+#                           /installed   its manifest, written when it is complete: the extras;
+#                                        the file's time is the last start of a server
 
 install_root <- function() cache_of("gym")
 

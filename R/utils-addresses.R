@@ -1,12 +1,12 @@
-# Addresses of servers, taken apart.
+# Parts of server addresses.
 
 is_loopback <- function(base) {
   grepl("^https?://(127[.][0-9.]+|localhost|\\[::1\\])(:[0-9]+)?(/|$)", base)
 }
 
 #' Find the host and port of a server on this machine
-#' @return A list of `host`, as the server takes it, and `port`; `NULL` for any other address
-#'   and one that no server of ours can have.
+#' @return A list of `host`, in the server's form, and `port`; `NULL` for any other address and one
+#'   that a server of ours cannot have.
 #' @noRd
 local_place <- function(base) {
   pattern <- "^http://(127([.][0-9]{1,3}){3}|localhost|\\[::1\\]):([0-9]{1,5})$"
@@ -22,7 +22,7 @@ local_place <- function(base) {
   list(host = if (host == "localhost") "127.0.0.1" else host, port = port)
 }
 
-# The call that starts a server at a place.
+# The call that starts a server at an address.
 start_call <- function(place) {
   host <- if (place$host != "127.0.0.1") paste0(", host = \"", place$host, "\"")
   paste0("gym_server_start(port = ", place$port, host, ")")

@@ -1,5 +1,5 @@
-# Checks of arguments. Each returns its value, invisibly, or aborts with
-# `gym_error_argument`, naming the argument and what was given for it.
+# Checks of arguments. Each returns its value, invisibly, or aborts with `gym_error_argument`, which
+# names the argument and its value.
 
 check_count <- function(x, min = 1, max = .Machine$integer.max, allow_null = FALSE,
                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
@@ -33,14 +33,14 @@ check_above_zero <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   invisible(x)
 }
 
-# Up to here doubles hold every whole number.
+# Up to here doubles represent every whole number.
 largest_seed <- 2^53
 
-# The rule for all seeds: what set.seed() takes, and more, as Gymnasium does. Those of environments
-# are at least 0.
+# The rule for all seeds: those of set.seed(), and larger ones, as in Gymnasium. Seeds of
+# environments are at least 0.
 check_seed <- function(x, min = -.Machine$integer.max, arg = rlang::caller_arg(x),
                        call = rlang::caller_env()) {
-  # The largest one is mentioned only where it is exceeded.
+  # Mention the largest one only if it is exceeded.
   max <- if (is_number(x) && x > largest_seed) largest_seed else Inf
   check_count(x, min = min, max = max, allow_null = TRUE, arg = arg, call = call)
   invisible(x)
@@ -96,7 +96,7 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   check_unique_names(x, arg, call)
 }
 
-# In JSON the last of them would win silently.
+# In JSON the last of them would silently win.
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {
@@ -119,7 +119,7 @@ check_dots_named <- function(dots, example, call = rlang::caller_env()) {
   check_unique_names(dots, "...", call)
 }
 
-# For functions that have `...` for their methods' sake only.
+# For functions that have `...` only for their methods.
 check_dots_empty <- function(..., call = rlang::caller_env()) {
   if (...length()) {
     given <- names(list(...))[[1L]] %||% ""
@@ -159,7 +159,7 @@ is_number <- function(x) {
 }
 
 range_text <- function(min, max) {
-  # The largest integer of R's is a limit of the type, not one to be mentioned.
+  # R's largest integer is a limit of the type; do not mention it.
   bounded <- max != .Machine$integer.max && max < Inf
   above <- min > -.Machine$integer.max
   if (above && bounded) {
@@ -190,7 +190,7 @@ describe_argument <- function(x) {
   }
 }
 
-# Can it be shown itself? The class of an integer64 is its only attribute.
+# Can the value itself be shown? The class of an integer64 is its only attribute.
 is_short <- function(x) {
   plain <- if (is_integer64(x)) unclass(x) else x
   is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))

@@ -1,6 +1,6 @@
-# Arrays: in R the first index runs fastest, in Python and on the wire ("row by row") the last one.
+# Arrays: in R the first index changes fastest, in Python and in messages ("row by row") the last.
 
-# Put elements that come row by row (last index fastest) into an array.
+# Puts elements given row by row (last index fastest) into an array.
 shape_values <- function(values, shape) {
   if (length(shape) <= 1L) {
     return(values)
@@ -8,7 +8,7 @@ shape_values <- function(values, shape) {
   wide <- is_integer64(values)
   values <- unclass(values)
   if (length(shape) == 2L) {
-    # A third of what aperm() takes.
+    # Takes a third of the time of aperm().
     values <- matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
   } else {
     dim(values) <- rev(shape)
@@ -17,7 +17,7 @@ shape_values <- function(values, shape) {
   if (wide) structure(values, class = "integer64") else values
 }
 
-# The elements of an array with its last index running fastest, as on the wire.
+# The elements of an array row by row (last index fastest), as in messages.
 row_major <- function(x) {
   if (!is.object(x) || !is_integer64(x)) {
     return(if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x))

@@ -1,12 +1,12 @@
 # Questions to the user of an interactive session.
 
-#' Ask a question that is answered by yes or no
+#' Ask a yes-or-no question
 #'
-#' Only where [rlang::is_interactive()]. It is asked once: a question asked again and again
-#' would swallow, line after line, a script that is pasted into the console.
-#' @param question The question; its last line is the prompt, what is above explains it.
-#' @param default What just pressing Enter means.
-#' @return `TRUE` or `FALSE`; `FALSE` when a dialog was cancelled.
+#' Only if [rlang::is_interactive()]. It asks once: repeated questions would swallow a pasted script
+#' line by line.
+#' @param question The question; its last line is the prompt, the lines above explain it.
+#' @param default The answer for just pressing Enter.
+#' @return `TRUE` or `FALSE`; `FALSE` if a dialog was cancelled.
 #' @noRd
 ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   if (is.function(getOption("askYesNo"))) {
@@ -14,7 +14,7 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
     return(isTRUE(utils::askYesNo(question, default = default)))
   }
   choices <- if (default) "(Yes/no)" else "(yes/No)"
-  # R truncates a long prompt: only the last line is the prompt.
+  # R truncates a long prompt, so only the last line is the prompt.
   lines <- strsplit(question, "\n", fixed = TRUE)[[1L]]
   writeLines(utils::head(lines, -1L))
   prompt <- paste0(utils::tail(lines, 1L), " ", choices, " ")
@@ -36,5 +36,5 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   choice == 1L
 }
 
-# A function of its own so that tests can replace it.
+# A separate function, so that tests can replace it.
 read_answer_line <- function(prompt) readline(prompt)

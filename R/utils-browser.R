@@ -1,14 +1,14 @@
-# Opening an address in RStudio's viewer, in a browser, or by the option `gym.viewer`.
+# Open an address in RStudio's viewer, in a browser, or by the option `gym.viewer`.
 
 #' Open an address for the user
 #'
-#' By `getOption("gym.viewer")`: a function of an address opens it, also in a script, and `FALSE`
-#' opens nothing. Without the option an interactive session opens it in RStudio's viewer,
-#' else in the browser.
+#' The option `getOption("gym.viewer")` may be a function of an address, which opens it, also in a
+#' script, or `FALSE`, which opens nothing. Without the option an interactive session opens the
+#' address in RStudio's viewer, otherwise in the browser.
 #' @param address A URL, or the path of a file.
 #' @param viewer The option's value, already checked.
-#' @return Whether something opened it without an error, logical: a machine may have no browser,
-#'   and some browsers fail silently. An error of the option's own function is raised.
+#' @return Whether something opened it without an error, logical: a machine may have no browser, and
+#'   some browsers fail silently. An error of the option's function is raised.
 #' @noRd
 open_address <- function(address, viewer = check_viewer()) {
   if (isFALSE(viewer)) {
@@ -21,7 +21,7 @@ open_address <- function(address, viewer = check_viewer()) {
   if (!rlang::is_interactive()) {
     return(FALSE)
   }
-  # RStudio's viewer shows what is on this machine.
+  # RStudio's viewer shows only local pages.
   elsewhere <- grepl("^https?://", address) && !is_loopback(address)
   usual <- (if (!elsewhere) getOption("viewer")) %||% utils::browseURL
   tryCatch(
@@ -33,7 +33,7 @@ open_address <- function(address, viewer = check_viewer()) {
   )
 }
 
-# Returns the option's value: a function of the address, FALSE for opening nothing, or NULL.
+# Returns the option's value: a function of the address, FALSE to open nothing, or NULL.
 check_viewer <- function(call = rlang::caller_env()) {
   viewer <- getOption("gym.viewer")
   if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {

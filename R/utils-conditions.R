@@ -1,4 +1,4 @@
-# Every error of the package is made here, so that each has a class.
+# All errors of the package are made here, so that each has a class.
 
 gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), parent = NULL) {
   rlang::abort(
@@ -12,7 +12,7 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   )
 }
 
-#' Run code whose errors are to name the call of the function that runs it
+#' Let errors name the call of the function that the user called
 #'
 #' @param code Calls other functions that users call, too.
 #' @param of The names of these functions, strings.
@@ -30,7 +30,7 @@ naming_own_call <- function(code, of, call = rlang::caller_env()) {
   withCallingHandlers(code, gym_error = function(cnd) rlang::cnd_signal(rename(cnd)))
 }
 
-# `path` says where in the whole value the wrong one lies; it is "" for the whole.
+# `path` is the place of the wrong part in the whole value; it is "" for the whole.
 abort_space <- function(space, value, problem, call, path = "") {
   place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")
   gym_abort(
@@ -49,7 +49,7 @@ abort_space <- function(space, value, problem, call, path = "") {
 
 describe_value <- function(value) {
   if (is_integer64(value)) {
-    # deparse() shows its bits.
+    # deparse() would show its bits as a double.
     return(paste("the integer64", describe_value(double_from_integer64(value))))
   }
   if (is.data.frame(value)) {

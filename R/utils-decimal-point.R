@@ -1,15 +1,15 @@
-# Numbers in texts for programs.
+# Numbers in texts that programs read.
 
-#' Run code that writes or reads numbers in texts that other programs write or read
+#' Run code that writes or reads numbers in texts for programs
 #'
-#' They have a decimal point, whatever `options(OutDec = )` and the locale of numbers say: these are
-#' for people, but `as.character()`, `sprintf()`, `write.table()` and jsonlite heed them, too.
+#' Such texts need a decimal point. `options(OutDec = )` and the locale's number format are for
+#' people, but `as.character()`, `sprintf()`, `write.table()` and jsonlite use them, too.
 #' @noRd
 with_decimal_point <- function(code) {
   locale <- Sys.getlocale("LC_NUMERIC")
   if (locale != "C") {
     Sys.setlocale("LC_NUMERIC", "C")
-    # R warns of any other locale, whoever sets it.
+    # R warns about any other locale.
     on.exit(suppressWarnings(Sys.setlocale("LC_NUMERIC", locale)))
   }
   if (getOption("OutDec") != ".") {

@@ -1,8 +1,8 @@
-# Running moments of observations, by which a network's inputs are normalised: how many there were,
-# and of each number the mean and the sum of squared deviations from it (`squares`). `scale` is what
-# comes of these: 1 / standard deviation.
+# Running moments of observations, which normalise a network's inputs: the count, and for each
+# number the mean and the sum of squared deviations from it (`squares`). `scale` is computed from
+# these: 1 / standard deviation.
 #
-# Two sets are merged as Chan, Golub and LeVeque do (1979, "Updating formulae and a pairwise
+# Two sets are merged as in Chan, Golub and LeVeque (1979, "Updating formulae and a pairwise
 # algorithm for computing sample variances").
 
 # A number whose standard deviation is below this becomes 0, as in the code of Mania, Guy and Recht
@@ -12,7 +12,7 @@ least_deviation <- 1e-7
 no_moments <- function() list(count = 0, mean = NULL, squares = NULL, scale = NULL)
 
 new_moments <- function(count, mean, squares) {
-  # Of a single observation there is no deviation; that code takes the square root of its square.
+  # A single observation has no deviation; the authors' code takes the square root of its square.
   deviation <- if (count > 1) sqrt(squares / (count - 1)) else abs(mean)
   list(
     count = as.numeric(count), mean = mean, squares = squares,
@@ -30,7 +30,7 @@ moments_of <- function(values) {
   new_moments(n, mean, .colSums(deviations * deviations, n, ncol(values)))
 }
 
-# The order matters in the last bits.
+# The order affects the last bits.
 merge_moments <- function(x, y) {
   if (is.null(x) || x$count == 0) {
     return(y)
@@ -47,7 +47,7 @@ merge_moments <- function(x, y) {
   )
 }
 
-# Before the first moments are known, the observations themselves.
+# Before the first moments are known, returns the observations unchanged.
 normalized <- function(values, moments) {
   if (is.null(moments$mean)) {
     return(values)

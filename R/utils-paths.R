@@ -1,8 +1,8 @@
-# Paths that are used later than they are given: the working directory may be another one by then,
-# and tools are run in one of their own and do not expand "~".
+# Paths that are used later: the working directory may have changed by then, and tools have their
+# own one and do not expand "~".
 
-# normalizePath() leaves the path of a file that does not exist yet as it is, and returns another
-# one after it was made, if a folder above it is a link.
+# normalizePath() does not change the path of a missing file, and returns another one after the file
+# was made if a folder above it is a link.
 absolute_path <- function(path) {
   path <- path.expand(path)
   if (is_windows()) {
@@ -13,8 +13,8 @@ absolute_path <- function(path) {
 
 is_windows <- function() .Platform$OS.type == "windows"
 
-# tempfile(), also where the session's temporary folder is gone: systems that clean /tmp delete it
-# after some days. It is made again then.
+# Like tempfile(), but recreates the session's temporary folder, which some systems delete after
+# some days.
 temporary_file <- function(pattern = "file", fileext = "") {
   tempfile(pattern, tempdir(check = TRUE), fileext)
 }

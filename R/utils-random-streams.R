@@ -1,21 +1,20 @@
-# Random numbers: a seed gives streams of their own, and the session's generator stays as it was.
-# A stream is a `.Random.seed` of R's generator "L'Ecuyer-CMRG", whose streams are far apart, as
-# ?parallel::nextRNGStream describes them. All kinds are fixed, so that what is drawn does not
-# depend on the session's RNGkind().
+# Random numbers: a seed has its own streams, and the session's generator is left as it was. A
+# stream is a `.Random.seed` of R's generator "L'Ecuyer-CMRG", whose streams are far apart, see
+# ?parallel::nextRNGStream. All kinds are fixed, so the session's RNGkind() has no effect.
 
-# Draws a seed from the session's generator.
 draw_seed <- function() sample.int(.Machine$integer.max, 1L)
 
-# Seeds for environments, which take whole numbers from 0. All are drawn at once: the first k of
-# them do not depend on how many there are.
+# Draws seeds for environments, which accept whole numbers from 0. All are drawn together: the first
+# k of them do not depend on their number.
 draw_environment_seeds <- function(n) sample.int(.Machine$integer.max, n, replace = TRUE)
 
-# The first stream of a seed. set.seed() takes no seed beyond 2^31 - 1. Of a larger one it makes two
-# streams, of its lower 31 bits and of the others, negative and less 1 so that they are no smaller
-# seed's; the generator joins two smaller ones, of three numbers each, and gets one of each stream.
+# The first stream of a seed. set.seed() does not accept a seed beyond 2^31 - 1. A larger one gives
+# two streams: one from its lower 31 bits, and one from the other bits, negative and less 1 so that
+# no smaller seed has it. The generator consists of two smaller ones with three numbers each, and
+# gets one of each stream.
 seed_stream <- function(seed) {
-  # First, as a seed that is drawn in the call must move the session's generator. set.seed() would
-  # take the bits of bit64's numbers for another one.
+  # Evaluate it first: a seed that is drawn in the call must change the session's generator.
+  # set.seed() would misread the bits of bit64's numbers.
   seed <- as.numeric(seed)
   stream_of <- function(seed) {
     set.seed(seed, "L'Ecuyer-CMRG", "Inversion", "Rejection")
@@ -30,11 +29,11 @@ seed_stream <- function(seed) {
   )
 }
 
-#' Make a random generator beside the session's
+#' Make a separate random generator
 #'
 #' @param seed A whole number.
-#' @param stream A stream to begin with, instead of the first one of the seed.
-#' @return An environment with `state`, which [with_generator()] moves on.
+#' @param stream A stream to start with, instead of the first one of the seed.
+#' @return An environment with `state`, which [with_generator()] updates.
 #' @noRd
 new_generator <- function(seed, stream = seed_stream(seed)) {
   generator <- new.env(parent = emptyenv())
@@ -42,9 +41,9 @@ new_generator <- function(seed, stream = seed_stream(seed)) {
   generator
 }
 
-#' Run code that draws from a generator beside the session's
+#' Run code that draws from a separate generator
 #'
-#' The generator goes on from where it was, and the session's is afterwards as it was.
+#' The generator continues where it was, and the session's is restored.
 #' @noRd
 with_generator <- function(generator, code) keep_random_state(draw_from(generator, code))
 
@@ -54,12 +53,12 @@ draw_from <- function(generator, code) {
   code
 }
 
-#' Run code and put R's generator back as it was
+#' Run code and restore R's generator
 #' @noRd
 keep_random_state <- function(code) {
   state <- globalenv()$.Random.seed
   if (is.null(state)) {
-    # R remembers the kinds elsewhere, too.
+    # R keeps the kinds elsewhere, too.
     kinds <- RNGkind()
     on.exit(forget_random_state(kinds))
   } else {
@@ -68,17 +67,17 @@ keep_random_state <- function(code) {
   code
 }
 
-# A session that has drawn nothing yet has no .Random.seed, and must have none afterwards: else its
-# first draw would depend on the seed that was used here.
+# A new session has no .Random.seed, and must have none afterwards. Otherwise its first random
+# number would depend on the seed used here.
 forget_random_state <- function(kinds) {
   suppressWarnings(RNGkind(kinds[[1L]], kinds[[2L]], kinds[[3L]]))
   rm(list = intersect(".Random.seed", ls(globalenv(), all.names = TRUE)), envir = globalenv())
 }
 
-#' Make the streams that everything is drawn from when episodes are played
+#' Make the streams for all random numbers in play
 #'
-#' @return An environment: `agent`, a generator for what an agent draws; `seeds`, a generator for
-#'   the seeds of episodes; `next_stream`, the stream of the batch that begins next.
+#' @return An environment: `agent`, a generator for the agent's random numbers; `seeds`, a generator
+#'   for the seeds of episodes; `next_stream`, the stream of the next batch.
 #' @noRd
 new_streams <- function(seed) {
   first <- seed_stream(seed)
@@ -96,7 +95,7 @@ take_stream <- function(streams) {
   stream
 }
 
-# The streams as a list that can be kept in a file.
+# The streams as a list that can be saved.
 saved_streams <- function(streams) {
   list(
     agent = streams$agent$state, seeds = streams$seeds$state, next_stream = streams$next_stream
@@ -114,9 +113,9 @@ restore_streams <- function(saved) {
 
 #' Draw numbers from 0 to 1, one at a time
 #'
-#' R takes as long for a single number as for fifty, so more are drawn than asked for.
-#' @return A list of functions: `draw()`, and `renew()`, after which none that was drawn before is
-#'   used: then what comes depends on R's generator alone.
+#' R takes as long for a single number as for fifty, so this draws in advance.
+#' @return A list of functions: `draw()`, and `renew()`, which discards the numbers drawn in
+#'   advance; the next ones then depend only on R's generator.
 #' @noRd
 uniform_draws <- function() {
   drawn <- numeric()

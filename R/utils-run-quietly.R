@@ -1,10 +1,10 @@
-# Programs that are run from R, and their ends.
+# Run programs from R and wait for them.
 
-#' Start a process with a tree id of its own
+#' Start a process with its own tree id
 #'
-#' processx finds a process's children by a tree id, which it draws from R's generator and the
-#' current second. Where the generator is restored, or the user sets a seed, several processes would
-#' have the same id, and killing one would kill the others. The generator is afterwards as it was.
+#' processx finds the children of a process by a tree id, which it derives from R's generator and
+#' the current second. If the generator is restored or the user sets a seed, several processes could
+#' have the same id, and killing one would kill the others. The generator is restored afterwards.
 #' @param code Starts a process.
 #' @noRd
 with_own_tree_id <- function(code) {
@@ -15,9 +15,9 @@ with_own_tree_id <- function(code) {
   })
 }
 
-# processx and the package parallel both handle SIGCHLD, the signal of ended children. When it is
-# loaded processx reads from this variable whether to pass the signal on. If it does not, parallel
-# waits at the session's end for forked children that ended long ago.
+# processx and the package parallel both handle SIGCHLD, the signal of ended children. On loading,
+# processx reads from this variable whether to pass the signal on. If it does not, parallel waits at
+# the end of the session for forked children that ended long ago.
 load_processx <- function() {
   variable <- "PROCESSX_NOTIFY_OLD_SIGCHLD"
   if (!isNamespaceLoaded("processx") && !nzchar(Sys.getenv(variable))) {
@@ -29,9 +29,9 @@ load_processx <- function() {
 
 #' Wait for a process to end
 #'
-#' Polls the process, as the `wait()` of processx takes SIGCHLD from the package parallel, see
+#' Polls the process, because `wait()` of processx takes SIGCHLD from the package parallel, see
 #' [load_processx()].
-#' @param seconds How long at most.
+#' @param seconds The longest time to wait.
 #' @noRd
 await_end <- function(process, seconds) {
   deadline <- proc.time()[["elapsed"]] + seconds
@@ -40,13 +40,13 @@ await_end <- function(process, seconds) {
   }
 }
 
-#' Run a program that is only asked something
+#' Run a program and return its output
 #'
-#' R's generator stays as it was.
+#' R's generator is left as it was.
 #' @param arguments A character vector.
-#' @param timeout After how many seconds it is killed.
-#' @return A list: `status`, `NA` for what could not be run or did not end in time, and `stdout`
-#'   and `stderr`, strings, then empty.
+#' @param timeout The time after which it is killed, in seconds.
+#' @return A list: `status`, `NA` if it could not be run or did not end in time, and `stdout` and
+#'   `stderr`, strings, which are then empty.
 #' @noRd
 run_quietly <- function(command, arguments, timeout = 30, env = NULL) {
   silent <- list(status = NA_integer_, stdout = "", stderr = "")

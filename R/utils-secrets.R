@@ -1,16 +1,16 @@
-# Texts that no error may show, such as tokens.
+# Texts that errors must not show, such as tokens.
 
-# Remembers a token that no error may show: an error keeps the call as the script wrote it, perhaps
-# with the token in it.
+# Remembers a token that errors must not show: an error keeps the call as the script wrote it,
+# perhaps with the token.
 hide_token <- function(token) {
   if (is.character(token)) {
     the_session$hidden <- unique(c(the_session$hidden, token[nzchar(token)]))
   }
 }
 
-#' Take the tokens out of what an error keeps
+#' Remove tokens from the parts of an error
 #' @param x A call, or a part of one.
-#' @return `x` with `"<token>"` in place of each text that is or contains a token.
+#' @return `x` with `"<token>"` instead of each text that is or contains a token.
 #' @noRd
 without_tokens <- function(x) {
   if (!length(the_session$hidden)) {
@@ -31,15 +31,15 @@ without_tokens <- function(x) {
 
 is_token_text <- function(texts) {
   found <- texts %in% the_session$hidden
-  # A short token may by chance be a part of any text.
+  # A short token may be a part of any text by chance.
   for (token in Filter(function(token) nchar(token) >= 8L, the_session$hidden)) {
     found <- found | grepl(token, texts, fixed = TRUE)
   }
   found
 }
 
-# The calls that led to an error, without tokens. NULL where no token is known: rlang then makes
-# the trace itself.
+# The calls that led to an error, without tokens. NULL if no token is known: rlang then makes the
+# trace itself.
 hidden_trace <- function(frame) {
   if (length(the_session$hidden)) {
     trace <- rlang::trace_back(bottom = frame)

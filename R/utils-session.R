@@ -1,19 +1,19 @@
-# What this R session knows, which all floors share:
+# The state of this R session, which all layers share:
 #
 #   pid             the process that loaded the package: a forked child has another one
 #   servers         the servers that this session started, by their addresses
 #   client          the client of the session's own server; named_client that of GYM_SERVER_URL
 #   instances       the instances that this session has created on servers, see http-instances.R
-#   curl_names      what curl calls its options here, see set_curl()
+#   curl_names      curl's names of its options, see set_curl()
 #   keys            the idempotency keys of this process, see http-connection.R
 #   environments    the environments written in R that are registered, by their ids
-#   hidden          tokens, which no error may show
+#   hidden          tokens, which errors must not show
 #
-# and, where they apply, what was declined, and the function by which an upper floor asks, see
-# prompted_server_starts().
+# and, if needed, addresses for which the user declined a server, and the function by which an upper
+# layer asks, see prompted_server_starts().
 #
-# Being an environment it is never identical to a copy that was read from a file or sent to
-# another process, which is how a client notices that it has been moved.
+# As an environment it is never identical to a copy that was read from a file or sent to another
+# process. This is how a client notices that it has been moved.
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
 the_session$environments <- list()

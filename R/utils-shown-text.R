@@ -9,14 +9,14 @@ unseen <- paste0(
   "\\x{2028}-\\x{202e}\\x{2066}-\\x{2069}\\x{feff}]"
 )
 
-#' Remove from a text what a terminal would obey
+#' Remove terminal commands from a text
 #'
-#' These are escape sequences, control characters and marks of direction. A long text is cut.
+#' These are escape sequences, control characters and marks of direction. A long text is shortened.
 #' @param x A character vector; names stay.
-#' @param most How many characters of each element.
+#' @param most The largest number of characters of an element.
 #' @noRd
 shown_text <- function(x, most = longest_shown) {
-  # Quick for plain and short texts, as most are.
+  # Fast for plain and short texts, the usual case.
   if (!length(x) || all(grepl("^[ -~]*$", x, useBytes = TRUE) & nchar(x, "bytes") <= most)) {
     return(x)
   }
@@ -28,7 +28,7 @@ shown_text <- function(x, most = longest_shown) {
   x
 }
 
-# The same for a text that is shown within a line.
+# The same for a text within a line.
 shown_line <- function(x, most = 200L) {
   if (!is.null(x)) gsub("[\t\n]+", " ", shown_text(x, most))
 }

@@ -1,6 +1,5 @@
-# Whole numbers of up to 64 bits in R: integer where they all fit, double up to
-# 2^53, beyond it bit64's integer64. No number is ever rounded: one that none of these
-# can hold is an error.
+# Whole numbers of up to 64 bits in R: integer if they all fit, double up to 2^53, beyond it bit64's
+# integer64. No number is ever rounded: a number that does not fit is an error.
 
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
@@ -55,7 +54,7 @@ abort_whole <- function(digits) {
   gym_abort(paste("The integer", digits, reason), class = "gym_error_space", call = NULL)
 }
 
-# The decimal digits of whole numbers of any type; text is returned as it is.
+# The decimal digits of whole numbers of any type; text is returned unchanged.
 whole_text <- function(x) {
   if (is.character(x)) {
     x
@@ -71,16 +70,15 @@ as_double <- function(x) as.double(double_from_integer64(x))
 
 # integer64 -------------------------------------------------------------------------
 
-# An integer64, such as a column that data.table or a database gives, keeps its whole numbers in the
-# bits of doubles. R's own functions take these for the doubles that they are not: 5 for 2.5e-323.
-# So a setting refuses it, by is_number() and are_whole(), and wherever else numbers come in
-# (actions, observations, rewards, seeds, weights, tables) plain_numbers() or narrow_integer64()
-# turns it into doubles.
+# An integer64, such as a column from data.table or a database, keeps its whole numbers in the bits
+# of doubles. R's own functions read these as doubles: 5 becomes 2.5e-323. So settings refuse it, by
+# is_number() and are_whole(). Where numbers come in (actions, observations, rewards, seeds,
+# weights, tables), plain_numbers() or narrow_integer64() converts it to doubles.
 
 is_integer64 <- function(x) is.object(x) && inherits(x, "integer64")
 
-# The numbers as doubles, those beyond 2^53 rounded, NA for NA; anything else as it is. In plain R,
-# as bit64 may not be installed.
+# The numbers as doubles, those beyond 2^53 rounded, NA for NA; other values unchanged. In plain R,
+# because bit64 may not be installed.
 double_from_integer64 <- function(x) {
   if (!is_integer64(x)) {
     return(x)
@@ -98,13 +96,13 @@ double_from_integer64 <- function(x) {
   x
 }
 
-# The same where no number is rounded by it; else the integer64.
+# The same if no number is rounded by it; otherwise the integer64.
 narrow_integer64 <- function(x) {
   if (!is_integer64(x)) {
     return(x)
   }
   numbers <- double_from_integer64(x)
-  # 2^53 itself may have been rounded to it.
+  # Rounding may have led to 2^53 itself.
   if (all(abs(numbers) < 2^53, na.rm = TRUE)) {
     return(numbers)
   }
@@ -114,7 +112,7 @@ narrow_integer64 <- function(x) {
   x
 }
 
-# The same for all numbers of a value that may be a list, or a data frame.
+# The same for all numbers of a value that may be a list or a data frame.
 narrow_values <- function(x, narrow = narrow_integer64) {
   if (is.list(x) && (!is.object(x) || is.data.frame(x))) {
     x[] <- lapply(x, narrow_values, narrow)
@@ -124,7 +122,7 @@ narrow_values <- function(x, narrow = narrow_integer64) {
   }
 }
 
-# Numbers that R can calculate with: an integer64 as doubles, or an error; anything else as it is.
+# Numbers for R's arithmetic: an integer64 as doubles, or an error; other values unchanged.
 plain_numbers <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   numbers <- narrow_integer64(x)
   if (is_integer64(numbers)) {
@@ -166,7 +164,7 @@ whole_from_halves <- function(bytes, n, signed) {
   structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
 }
 
-# Whether all of the numbers fit R's integers.
+# Whether all numbers fit R's integers.
 halves_are_narrow <- function(lower, upper, signed) {
   !anyNA(lower) && !anyNA(upper) && all(upper == (lower < 0L) * -1L) &&
     (signed || all(upper == 0L))
@@ -193,7 +191,7 @@ bytes_of_whole <- function(x) {
   writeBin(as.vector(halves), raw(), size = 4L, endian = "little")
 }
 
-# The R integer that has the bits of an unsigned number below 2^32: NA is 2^31.
+# The R integer with the bits of an unsigned number below 2^32: NA is 2^31.
 int32_bits <- function(x) {
   x <- x - (x >= 2^31) * 2^32
   x[x == -2^31] <- NA

@@ -8,8 +8,8 @@ number_text <- function(x) marked_text(x, digits = 4L)
 
 whole_number_text <- function(n) marked_text(n, scientific = FALSE)
 
-# Thousands are marked by a comma, but not where that is the decimal mark, which options(OutDec = )
-# and a locale change.
+# Thousands have a comma, unless that is the decimal mark, which options(OutDec = ) and a locale
+# change.
 marked_text <- function(x, ...) {
   if (grepl(",", format(0.5, scientific = FALSE), fixed = TRUE)) {
     format(x, ..., big.mark = ".", decimal.mark = ",")
@@ -18,7 +18,7 @@ marked_text <- function(x, ...) {
   }
 }
 
-# Each by itself: together they would all get as many decimals as the longest needs.
+# One by one: together they would all get as many decimals as the longest needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
 
 # In a Turkish locale tolower("I") has no dot, and toupper("i") has one.
@@ -36,10 +36,10 @@ seconds_text <- function(seconds) {
   }
 }
 
-# A name without what people mix up in names.
+# A name without the characters that people confuse.
 plain_name <- function(x) gsub("[._]", "", lower_case(x))
 
-# The one of `choices` that `name` seems to be a misspelling of; character(0) for none.
+# The choice that `name` is probably a misspelling of; character(0) for none.
 nearest_name <- function(name, choices) {
   ordered <- function(x) {
     vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
@@ -47,7 +47,7 @@ nearest_name <- function(name, choices) {
   distance <- function(form) utils::adist(form(plain_name(name)), form(plain_name(choices)))[1L, ]
   begins <- nchar(name) > 3L & startsWith(plain_name(choices), plain_name(name))
   close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins
-  # Of equally near names the one with the same letters is better.
+  # Of equally similar names the one with the same letters is better.
   best <- order(distance(identity), distance(ordered))
   utils::head(choices[best[close[best]]], 1L)
 }
