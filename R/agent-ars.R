@@ -41,7 +41,6 @@
 #'   environment, such as `continuous = TRUE` for LunarLander.
 #' @return `agent_ars()` returns an agent of class `gym_agent_ars`. `search_ars()` makes this agent,
 #'   trains it and returns the result of [train_agent()].
-#'   it and returns what [train_agent()] does.
 #' @section Errors: `gym_error_argument` for an invalid argument.
 #' @references H. Mania, A. Guy and B. Recht (2018), Simple random search of static linear policies
 #'   is competitive for reinforcement learning, NeurIPS 31. Code:

@@ -37,7 +37,6 @@
 #'   learners that took an arm with the largest mean reward, from 0 to 1); `values`, a matrix with a
 #'   row for each learner and a column for each arm, holding the final values or preferences; and
 #'   `label`, `learners` and `seed`.
-#'   `learners` and `seed`.
 #' @section Errors: `gym_error_argument`.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press, chapter 2.

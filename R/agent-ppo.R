@@ -64,7 +64,6 @@
 #'   actions by their probability, or observations that are not vectors. `gym_error_agent` if
 #'   weights become infinite or `NaN`; the field `result` is the training with the last finite
 #'   weights.
-#'   `result` has the last good ones.
 #' @references J. Schulman et al. (2017), Proximal policy optimization algorithms, arXiv:1707.06347.
 #'
 #'   J. Schulman et al. (2016), High-dimensional continuous control using generalized advantage

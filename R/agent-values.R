@@ -322,8 +322,6 @@ weights_policy <- function(agent, columns) {
 #'   that were never left, such as terminal ones, keep their first value.
 #' @section Errors: `gym_error_argument` if `x` was not learned by a table or by features of
 #'   Discrete observations.
-#' @section Errors: `gym_error_argument` for what was not learned by a table, nor by features of
-#'   Discrete observations.
 #' @export
 #' @examples
 #' walk <- gym_model(data.frame(

@@ -13,7 +13,6 @@
 #' * optionally a method `render()`, which either plots or returns a picture, as in [gym_env()].
 #' * the two spaces, either as public fields `observation_space` and `action_space`, or as arguments
 #'   of `super$initialize()`.
-#'   `super$initialize()`.
 #'
 #' `$new()` calls `super$initialize()`, with the arguments listed below. From then on `env$reset()`
 #' and `env$step()` check arguments and results, count the steps, and draw from the environment's

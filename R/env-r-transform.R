@@ -170,7 +170,6 @@ observation_memory <- function(traits, n) {
 #'   sub-environments, and of whether the step after an end only resets. It returns such functions.
 #' @return A function like `around` of env-r-wrappers.R. An environment of a server is its third
 #'   argument: its results are already checked.
-#'   argument: what that returns has been checked.
 #' @noRd
 around_batches <- function(inside, outside, around) {
   function(inner, num_envs, env = NULL) {

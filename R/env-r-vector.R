@@ -289,7 +289,6 @@ stack_checked <- function(outs, sub_envs, numbers, call) {
 #'
 #' All sub-environments are always stepped, including those whose episode has ended; their results
 #' are ignored.
-#' left out.
 #' @noRd
 vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   sub_env <- definition_sub_env(definition, num_envs)

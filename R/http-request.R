@@ -76,7 +76,6 @@ perform_request <- function(request, content = NULL, call = rlang::caller_env(),
 #'
 #' @return The result of `read` of the request. If there is none, an object with the attribute
 #'   "unread", which is the response or the connection's error.
-#'   "unread", which is the response or the connection's error.
 #' @noRd
 attempt_request <- function(request, connection, handle, key) {
   state <- request$client$state

@@ -12,7 +12,6 @@
 #'   `autoplot()`.
 #' @param what What to show, a string: `"mean_reward"`, the default, or `"best_share"`.
 #' @param main The title. `NULL`, the default, names the bandit.
-#' @param main The title; `NULL`, the default, names the bandit.
 #' @return A ggplot. `plot()` returns it invisibly.
 #' @rdname plot.gym_bandit_learning
 #' @exportS3Method ggplot2::autoplot

@@ -6,7 +6,6 @@
 #' @param name The name of the info's element that is the mask.
 #' @param note A function of a batch of observations and their masks (a logical matrix with a row
 #'   for each observation and a column for each action), which is called whenever masks arrive.
-#'   for each observation and a column for each action, which is called whenever some are known.
 #' @noRd
 with_masks <- function(vector_env, name, note, call) {
   env <- vector_env$env
