@@ -1,16 +1,15 @@
 #' Wrap an environment before it is made
 #'
 #' Add a wrapper of Gymnasium to an environment before [gym_make()], [env_create()], [rollout()] or
-#' [search_random()] makes it on the server: a step limit, a scale for its actions, a smaller
-#' picture. Three wrappers call an R function, for example one that shapes rewards, see below. Use
-#' the pipe to add several, in the order in which they are applied. Nothing is made yet. R sees the
-#' spaces of the wrapped environment. A `"TimeLimit"` can only lower the environment's own step
-#' limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
+#' [search_random()] makes it: a step limit, a scale for its actions, a smaller picture. Three
+#' wrappers call an R function, for example one that shapes rewards. Use the pipe to add several, in
+#' the order in which they are applied. R sees the spaces of the wrapped environment. A
+#' `"TimeLimit"` can only lower the environment's own step limit;
+#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
 #' # R functions
 #'
-#' These wrappers call your function in each step, for environments of Gymnasium and for those
-#' written in R:
+#' These wrappers call your function in each step, around any environment:
 #' * `"TransformReward"`: `func` returns the new rewards. It gets `reward`, and those of
 #'   `observation` (before the action), `action`, `next_observation`, `terminated` and `truncated`
 #'   that are among its arguments. The environment's `reward_threshold` is dropped, because it is
@@ -21,14 +20,13 @@
 #'   actions for the environment. Give the `action_space` of its argument if it is a different one.
 #'
 #' `func` gets batches, even for a single environment: rewards as a vector, observations in the form
-#' for policies, such as a matrix with a row for each (see [act()]). It returns as many values. Its
-#' only argument may have any name. Its result should depend on its arguments only.
+#' for policies (see [act()]). It returns as many values, which should depend on its arguments only.
+#' Its only argument may have any name.
 #'
 #' R plays a wrapped environment of Gymnasium step by step (see [rollout()]). This is slower than
 #' playing on the server, and learners of tables play instead of sampling from a model. The server's
-#' wrappers are applied first, inside. You can also wrap an environment of [gym_make()]: the result
-#' is the same instance with other rewards, observations or actions. The classic calls ignore these
-#' wrappers.
+#' wrappers are applied first, inside. If you wrap an environment of [gym_make()], the result is the
+#' same instance. The classic calls ignore these wrappers.
 #'
 #' # Environments written in R
 #'

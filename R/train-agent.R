@@ -36,23 +36,20 @@
 #' A training stops at a lucky moment. So a target somewhat above makes it more likely that the
 #' final evaluation reaches the environment's; trainings that are compared need the same.
 #'
-#' # Sampling from a model
-#'
 #' FrozenLake, CliffWalking and Taxi have a model. A learner of one of them, given by its id, gets
-#' the model from the server once and samples from it in R. The distribution is the same and the
-#' speed many times higher. A message says so. It plays on the server with `model = FALSE`, and if
-#' the environment itself is needed: with `mask`, `callback` or `num_workers`, with wrappers or a
-#' `render_mode`, on a lake with a random map, and in a Taxi with a fickle passenger. A model
-#' without a step limit, such as CliffWalking's, requires `max_steps`.
+#' the model from the server once and samples from it in R, which is many times faster and has the
+#' same distribution. A message says so. It plays on the server with `model = FALSE`, with `mask`,
+#' `callback`, `num_workers`, wrappers or a `render_mode`, on a lake with a random map, and in a
+#' Taxi with a fickle passenger. A model without a step limit, such as CliffWalking's, requires
+#' `max_steps`.
 #'
 #' # Resuming
 #'
 #' `checkpoint` keeps the training in a file. It is written after each iteration, or less often if
 #' iterations are short, so that it takes at most a tenth of the time. The same call resumes the
 #' training, with the same result as an uninterrupted one. A finished training is returned at once.
-#' `iterations` and `total_steps` may differ, except in a search. (A network with given sizes has
-#' already drawn its weights. Make it after [set.seed()] or with the sizes `NA`. Otherwise it is
-#' another policy in the next session.)
+#' `iterations` and `total_steps` may differ, except in a search. (A network with given sizes draws
+#' its weights when it is made: make it after [set.seed()], or with the sizes `NA`.)
 #'
 #' # The tutorial's rule
 #'
