@@ -1,20 +1,20 @@
 #' Plot a comparison of trainings
 #'
-#' Of scores: mean, median and interquartile mean of each training with their intervals
-#' (`type = "scores"`, the default), the performance profiles (`"profile"`), or the probabilities
-#' that one scores higher than another (`"improvement"`). Of steps to a target: the share of the
-#' runs that has reached it, over the steps of the training, with its interval; ticks are runs that
-#' ended without it.
+#' Show a comparison. For scores: the mean, median and interquartile mean of each training with
+#' their intervals (`type = "scores"`, the default), the performance profiles (`"profile"`), or the
+#' probabilities that one training scores higher than another (`"improvement"`). For steps to a
+#' target: the share of runs that have reached it, over the steps of the training, with its
+#' interval. Ticks are runs that ended without reaching it.
 #'
-#' `autoplot()` makes the picture, a ggplot, to which scales, themes and layers can be added;
-#' `plot()` prints it, too.
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object A comparison, as [compare_trainings()] returns it.
-#' @param type What is shown of scores, a string.
-#' @param main The title; `NULL`, the default, names the environments.
-#' @param ... Further arguments of `plot()` are those of `autoplot()`, which takes no others.
-#' @return A ggplot; of `plot()` invisibly.
+#' @param x,object A comparison, as returned by [compare_trainings()].
+#' @param type What to show of scores, a string.
+#' @param main The title. `NULL`, the default, names the environments.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
 #' @section Errors: `gym_error_argument` for another `type`.
 #' @rdname plot.gym_comparison
 #' @exportS3Method ggplot2::autoplot
@@ -94,7 +94,7 @@ improvement_picture <- function(x) {
 }
 
 reached_picture <- function(x) {
-  # Steps drawn by corners, so that the band has them, too.
+  # Steps drawn with corners, so that the band has them, too.
   rows <- do.call(rbind, lapply(split(x$profile, list(x$profile$training, x$profile$env_id),
                                       drop = TRUE), function(rows) {
     n <- nrow(rows)

@@ -7,11 +7,11 @@
 #' middle half. For a single training, the line connects its evaluations. The dashed line is the
 #' target. Several trainings are compared in one picture.
 #'
-#' Between two evaluations a training's return is taken from the straight line between them. The
-#' line of several seeds is thick as long as all of them train. From where the first one has ended
-#' it is thin, as that of a training that has ended is: a seed that has ended counts with its last
-#' evaluation. A picture begins where all seeds were evaluated once. Where targets, budgets or rules
-#' of evaluation differ in one environment, the caption names them.
+#' Between two evaluations the return is interpolated linearly. The line of several seeds is thick
+#' while all of them train. It becomes thin when the first one ends; a seed that has ended counts
+#' with its last evaluation. The line of a single training is thin after its end, too. The picture
+#' begins when all seeds have an evaluation. If targets, budgets or rules of evaluation differ in
+#' one environment, the caption names them.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -92,7 +92,7 @@ ended_caption <- function(seeds) {
   }
 }
 
-# The target that all have, `NULL` where there is none, or not the same.
+# The common target, or NULL.
 common_target <- function(trainings) {
   targets <- unique(lapply(unname(trainings), function(x) as.numeric(x$target)))
   if (length(targets) == 1L && length(targets[[1L]])) finite_target(targets[[1L]])

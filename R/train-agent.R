@@ -7,16 +7,16 @@
 #'
 #' # When training ends
 #'
-#' Before the first iteration and every `eval_every` iterations the agent's own policy plays
-#' `eval_episodes_curve` episodes, which make the learning curve. When these, or the candidates of
-#' an iteration, reach the target in the mean, the policy plays `eval_episodes` fresh ones, and
-#' these decide whether training ends. That may happen several times, and the time at which it ends
-#' is then one at which the policy was lucky. So at the end the policy plays `eval_episodes` further
-#' episodes, once, whose seeds nothing has seen before: their mean return is what the training has
-#' come to. Steps of evaluations are not counted as steps of the training.
+#' Before the first iteration and then every `eval_every` iterations, the agent's own policy plays
+#' `eval_episodes_curve` episodes for the learning curve. If their mean return, or that of the
+#' candidates, reaches the target, the policy plays `eval_episodes` new episodes, which decide
+#' whether training ends. This may happen several times, so training tends to end when the policy
+#' was lucky. At the end the policy therefore plays `eval_episodes` further episodes, with seeds
+#' that were never used before. Their mean return is the result of the training. Evaluations do not
+#' count as steps of the training.
 #'
-#' Where episodes have no limit of steps, neither the environment's nor `max_steps`, the policy is
-#' not evaluated before the first iteration: untrained, it might never end an episode.
+#' Without a step limit, by the environment or `max_steps`, the policy is not evaluated before the
+#' first iteration: an untrained policy might never end an episode.
 #'
 #' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
 #' exactly, without playing. These evaluations have 0 episodes and a standard error of 0.
@@ -33,8 +33,11 @@
 #' | `"Pendulum-v1"` | -200 | ours; none is registered |
 #' | `"Swimmer-v5"` | 325 | Mania, Guy and Recht (2018); registered: 360 |
 #'
-#' A training stops at a lucky moment. So a target somewhat above makes it more likely that the
-#' final evaluation reaches the environment's; trainings that are compared need the same.
+#' Training stops at a lucky moment, so a target somewhat above the environment's makes it more
+#' likely that the final evaluation reaches the latter. Use the same target for trainings that you
+#' compare.
+#'
+#' # Sampling from a model
 #'
 #' FrozenLake, CliffWalking and Taxi have a model. A learner of one of them, given by its id, gets
 #' the model from the server once and samples from it in R, which is many times faster and has the
@@ -63,47 +66,47 @@
 #' @param agent The agent, made by a function such as [agent_ars()], [agent_ppo()] or [agent_q()],
 #'   or your own, see [agent_ask()].
 #' @param env The environment, as for [rollout()].
-#' @param policy The policy whose weights are to be found: a network, by default
-#'   [policy_linear()], or the one that an agent's help page tells. Most agents begin with the
-#'   weights that it has. A learner such as [agent_q()] makes a policy of its own, and may begin
-#'   with a [policy_table()] of values.
-#' @param iterations,total_steps After how many iterations, or steps of the environment, to end,
-#'   whole numbers of at least 1. The iteration in which the steps are used up is played to its end.
-#'   One of the two must be given.
-#' @param episodes How many episodes each candidate, or the learner, plays in an iteration, a whole
-#'   number of at least 1; the default is 1. Agents that follow gradients choose it themselves.
-#' @param target The mean return at which training ends, a number. `NULL`, the default, takes the
-#'   environment's, the same for every agent, where it has one (see below); `Inf` goes on until the
-#'   budget is used up.
-#' @param max_steps After how many steps to cut an episode short, as for [rollout()].
-#' @param eval_every After how many iterations the agent's policy is looked at, a whole number of at
-#'   least 1; the default is 10.
-#' @param eval_episodes How many episodes decide whether training ends, and make the final
-#'   evaluation, a whole number of at least 2; the default is 100.
-#' @param eval_episodes_curve How many episodes make a point of the learning curve, a whole number,
-#'   at most `eval_episodes` of which are played; the default is 10. With 0 there is no curve, and
-#'   no time is spent on it.
-#' @param evaluate How evaluations play a network that draws its actions, as agents that follow
-#'   gradients have: `"greedy"`, the default, by its most likely actions, or `"draw"`, as it is. The
-#'   same policy decides when training ends, is evaluated at the end, and is returned. Training
-#'   plays the agent's [behavior policy][agent_behavior()].
-#' @param seed A whole number that fixes all that is drawn, as for [rollout()].
-#' @param seeds `NULL`, the default, or different whole numbers: then the agent is trained anew with
-#'   each of them, and all trainings are returned. Each is the one that `train_agent(seed = )` gives
-#'   with that seed. `checkpoint = "training.rds"` becomes a file for each, such as
-#'   `"training-7.rds"`, and `log` has a folder for each, such as `seed-7`.
-#' @param ... The environment's own arguments, by name, such as `continuous = TRUE` for
-#'   LunarLander, where it is named by its id.
-#' @param solved_by What decides that the environment is solved, and ends the training:
-#'   `"evaluation"`, the default, a stopping evaluation of the agent's policy; or `"candidate"`, for
-#'   [agent_random()] alone, the tutorial's rule.
-#' @param callback `NULL`, the default, or a function that is called after each iteration (of a
-#'   search after those that were played side by side) with the training so far, an object as
-#'   `train_agent()` returns it. Training ends when it returns `FALSE`.
-#' @param log `NULL`, the default, or a folder, which is made where it does not exist: each
-#'   iteration appends a row to `progress.csv` there, each evaluation one to `evaluations.csv`, and
-#'   `config.json` says what was trained ([learning_curves()] reads it). What an earlier training
-#'   has left there keeps its rows as `progress-1.csv`, and so on.
+#' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
+#'   the agent's help page. Most agents start with its weights. A learner such as [agent_q()] makes
+#'   its own policy, and can start with a [policy_table()] of values.
+#' @param iterations,total_steps The number of iterations, or of steps of the environment, after
+#'   which training ends, whole numbers of at least 1. The last iteration is played to its end. Give
+#'   at least one of the two.
+#' @param episodes The number of episodes that each candidate, or the learner, plays in an
+#'   iteration, a whole number of at least 1. The default is 1. Agents that follow gradients choose
+#'   it themselves.
+#' @param target The mean return at which training ends, a number. `NULL`, the default, uses the
+#'   environment's target if it has one, the same for every agent (see below). `Inf` trains until
+#'   the budget is used up.
+#' @param max_steps The number of steps after which an episode is cut off, as for [rollout()].
+#' @param eval_every The number of iterations between evaluations, a whole number of at least 1. The
+#'   default is 10.
+#' @param eval_episodes The number of episodes that decide whether training ends, and of the final
+#'   evaluation, a whole number of at least 2. The default is 100.
+#' @param eval_episodes_curve The number of episodes for a point of the learning curve, a whole
+#'   number; no more than `eval_episodes` are played. The default is 10. With 0 there is no curve,
+#'   and no time is spent on it.
+#' @param evaluate How evaluations play a network that draws its actions (as agents that follow
+#'   gradients use): `"greedy"`, the default, takes the most likely actions; `"draw"` draws them.
+#'   The same policy decides when training ends, is evaluated at the end, and is returned. Training
+#'   itself plays the agent's [behavior policy][agent_behavior()].
+#' @param seed A whole number that fixes all random numbers, as for [rollout()].
+#' @param seeds `NULL`, the default, or different whole numbers to train the agent once with each.
+#'   Each training is the same as that of `train_agent(seed = )`. All are returned.
+#'   `checkpoint = "training.rds"` becomes a file for each, such as `"training-7.rds"`, and `log`
+#'   has a folder for each, such as `seed-7`.
+#' @param ... Arguments of the environment, by name, such as `continuous = TRUE` for LunarLander, if
+#'   it is given by its id.
+#' @param solved_by What decides that the environment is solved and ends the training:
+#'   `"evaluation"`, the default, for an evaluation of the agent's policy; or `"candidate"`, for the
+#'   tutorial's rule, with [agent_random()] only.
+#' @param callback `NULL`, the default, or a function that is called after each iteration (in a
+#'   search, after each batch of rounds) with the training so far, an object as returned by
+#'   `train_agent()`. Training ends if it returns `FALSE`.
+#' @param log `NULL`, the default, or a folder, which is created if it does not exist. Each
+#'   iteration appends a row to `progress.csv` and each evaluation one to `evaluations.csv`.
+#'   `config.json` describes the training. [learning_curves()] reads the folder. The tables of an
+#'   earlier training are renamed to `progress-1.csv`, and so on.
 #' @param checkpoint `NULL`, the default, or the file to keep the training in, such as
 #'   `"training.rds"`.
 #' @param resume Resume from the file if it exists? `TRUE`, the default, or `FALSE`, which starts

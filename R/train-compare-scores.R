@@ -1,4 +1,4 @@
-# Comparing scores at a common budget, as Agarwal et al. (2021) do.
+# Compares scores at a common budget, like Agarwal et al. (2021).
 
 compare_by_scores <- function(trainings, curves, settings, reference, call) {
   if (is.null(curves$env_id)) curves$env_id <- NA_character_
@@ -30,8 +30,8 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
 
 #' Find the score of each run
 #'
-#' Where all have the same budget in steps it is the last evaluation. Otherwise it is read from the
-#' learning curve, from the straight line between two evaluations.
+#' If all runs have the same budget in steps, it is the last evaluation. Otherwise it is
+#' interpolated linearly on the learning curve.
 #' @return A list: `runs`, `steps` and `note`, which is `NULL` or says how scores were found.
 #' @noRd
 run_scores <- function(trainings, curves, steps, call) {
@@ -95,7 +95,7 @@ check_same_environments <- function(runs, call) {
 
 # Normalising ---------------------------------------------------------------------------
 
-# What a random policy earns, and the environment's threshold.
+# The return of a random policy, and the environment's threshold.
 default_reference <- function(trainings, call) {
   if (!length(trainings)) {
     gym_abort(
@@ -149,8 +149,8 @@ normalised_scores <- function(runs, reference, call) {
 
 # Statistics ----------------------------------------------------------------------------
 
-# Scores are a list with a vector for each environment. What was drawn is a list with a matrix for
-# each, which has a column for each draw; the scores themselves are such matrices with one column.
+# Scores are a list with a vector for each environment. Bootstrap samples are a list with a matrix
+# for each, with a column for each sample. The scores themselves are such matrices with one column.
 score_statistics <- list(
   mean = function(each) Reduce(`+`, lapply(each, colMeans)) / length(each),
   median = function(each) {
@@ -188,7 +188,7 @@ score_table <- function(scores, drawn, level) {
   do.call(rbind, rows)
 }
 
-# How often a run of one scores higher than one of the other: ties count half.
+# The probability that a run of one training scores higher than one of the other: ties count half.
 improvement_probability <- function(x, y) {
   each <- Map(function(x, y) {
     wins <- 0
@@ -215,7 +215,7 @@ improvement_table <- function(scores, drawn, level) {
   }))
 }
 
-# At how many scores a profile is calculated.
+# The number of scores at which a profile is computed.
 profile_places <- 101L
 
 profile_table <- function(scores, drawn, level) {

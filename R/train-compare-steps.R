@@ -1,4 +1,4 @@
-# Comparing trainings that stop at a target by the steps that they needed.
+# Compares trainings that stop at a target by the steps that they needed.
 
 compare_by_steps <- function(trainings, level) {
   runs <- do.call(rbind, unname(Map(function(x, label) {
@@ -30,9 +30,9 @@ compare_by_steps <- function(trainings, level) {
   list(by = "steps", table = bind("table"), runs = runs, profile = bind("profile"))
 }
 
-#' The share that has not reached the target after so many steps
+#' Estimate the share that has not reached the target after so many steps
 #' @return A data frame with a row for 0 steps and for each number at which a run ended: `steps`,
-#'   `survival`, and the interval `lower` and `upper`, `NA` where all or none are left.
+#'   `survival`, and the interval `lower` and `upper`, `NA` if all or none are left.
 #' @noRd
 kaplan_meier <- function(steps, reached, level) {
   at <- sort(unique(steps))

@@ -1,69 +1,69 @@
 #' Compare trainings
 #'
-#' Says how agents compare over many seeds, with intervals: their scores at a common budget, or the
-#' steps that they needed to a target.
+#' Compare agents over many seeds, with intervals: by their scores at a common budget, or by the
+#' steps that they needed to reach a target.
 #'
 #' # Scores
 #'
 #' Trainings without a target (`target = Inf`) are compared by their scores, the mean returns of the
-#' final evaluations. Where budgets differ, they are compared at the smallest number of steps that
-#' all have taken, by their learning curves, and `print()` says so. The statistics are those of
-#' Agarwal et al. (2021):
+#' final evaluations. If budgets differ, the learning curves are compared at the smallest number of
+#' steps that all have taken, and `print()` says so. The statistics are those of Agarwal et al.
+#' (2021):
 #'
-#' * `mean` of all scores, `median` of the environments' mean scores (with one environment the mean
-#'   again), and `iqm`, the interquartile mean: that of the middle half of all runs, which a few
+#' * `mean` of all scores, `median` of the environments' mean scores (with one environment, the mean
+#'   again), and `iqm`, the interquartile mean: the mean of the middle half of all runs, which a few
 #'   lucky or failed seeds change little;
-#' * the probability of improvement, that a run of one agent scores higher than one of another, the
-#'   mean over the environments;
-#' * the performance profile: which share of the runs scores more than each number.
+#' * the probability of improvement: the probability that a run of one agent scores higher than one
+#'   of another, averaged over the environments;
+#' * the performance profile: the share of runs that score more than each number.
 #'
-#' Intervals are percentiles of a stratified bootstrap, which draws runs anew in each environment.
+#' Intervals are percentiles of a stratified bootstrap, which resamples the runs of each
+#' environment.
 #'
-#' In several environments scores are normalised, so that 0 is `low` and 1 is `high` of `reference`.
-#' By default these are what a random policy earns (100 episodes, seed 1) and the environment's
-#' threshold, see [train_agent()].
+#' With several environments, scores are normalised so that 0 is `low` and 1 is `high` of
+#' `reference`. By default these are the mean return of a random policy (100 episodes, seed 1) and
+#' the environment's threshold, see [train_agent()].
 #'
 #' # Steps to a target
 #'
-#' Trainings that stop at a target all score about that target. They are compared by the steps of
-#' the training after which they reached it. Of a run that did not reach it only is known that it
-#' needs more steps than it had: it is censored, and the share that has reached the target after so
-#' many steps is estimated by Kaplan and Meier (1958), with Greenwood's variance on the scale of
-#' log(-log).
+#' Trainings that stop at a target all score about that target. They are compared by the steps that
+#' they needed to reach it. A run that did not reach it is censored: it needs more steps than it
+#' had. The share of runs that have reached the target after so many steps is estimated as in Kaplan
+#' and Meier (1958), with Greenwood's variance on the scale of log(-log).
 #'
-#' @param ... Trainings of class [gym_trainings] or `gym_training`, by name or not. Those of one
-#'   agent in several environments have the same name. Or one data frame as [learning_curves()]
-#'   returns it, with logs of other programs, compared by scores.
-#' @param steps The number of steps at which scores are compared; `NULL`, the default, is the common
+#' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
+#'   one agent in several environments have the same name. Or one data frame as returned by
+#'   [learning_curves()], including logs of other programs, compared by scores.
+#' @param steps The number of steps at which scores are compared. `NULL`, the default, is the common
 #'   budget.
 #' @param reference `NULL`, the default, or a data frame with the columns `env_id`, `low` and
-#'   `high`, which normalises scores also in one environment.
-#' @param reps How many times the bootstrap draws, a whole number of at least 1.
+#'   `high`, which also normalises scores in one environment.
+#' @param reps The number of bootstrap samples, a whole number of at least 1.
 #' @param level The confidence level of the intervals, a number between 0 and 1.
-#' @param seed A whole number that fixes the bootstrap, or `NULL`, the default, to draw from the
+#' @param seed A whole number that fixes the bootstrap. `NULL`, the default, draws from the
 #'   session's generator.
 #' @param x A comparison.
 #' @param row.names,optional Not used.
 #' @return An object of class `gym_comparison`, a list with the elements
 #'   \describe{
 #'     \item{by}{`"scores"` or `"steps"`.}
-#'     \item{table}{A data frame, which `as.data.frame()` returns: for scores a row for each
-#'       training and statistic, `training`, `runs` (an integer), `statistic` (`"mean"`, `"median"`,
-#'       `"iqm"`), `value`, `lower`, `upper`; for steps a row for each training and environment,
-#'       `training`, `env_id`, `runs`, `reached` (how many, an integer), `median`, `lower`, `upper`
-#'       (steps, `NA` where fewer than half have reached the target).}
+#'     \item{table}{A data frame, which `as.data.frame()` returns. For scores it has a row for each
+#'       training and statistic: `training`, `runs` (an integer), `statistic` (`"mean"`, `"median"`,
+#'       `"iqm"`), `value`, `lower`, `upper`. For steps it has a row for each training and
+#'       environment: `training`, `env_id`, `runs`, `reached` (the number of runs, an integer),
+#'       `median`, `lower`, `upper` (steps, `NA` if fewer than half have reached the target).}
 #'     \item{runs}{A data frame with a row for each run: `training`, `env_id`, `seed`, `steps`, and
 #'       `score`, or `reached` (a logical).}
-#'     \item{improvement}{For scores a data frame with a row for each pair: `training`, `than`,
+#'     \item{improvement}{For scores, a data frame with a row for each pair: `training`, `than`,
 #'       `probability`, `lower`, `upper`.}
 #'     \item{profile}{A data frame of the curves that [plot()][plot.gym_comparison()] shows:
 #'       `training`, `score` (or `env_id` and `steps`), `share`, `lower`, `upper`.}
 #'     \item{reference}{The data frame that normalised the scores, or `NULL`.}
-#'     \item{notes}{Strings: what makes the comparison unequal.}
+#'     \item{notes}{Differences that make the comparison unfair, strings.}
 #'     \item{steps, level, reps, seed}{As given, found or drawn.}
 #'   }
-#' @section Errors: `gym_error_argument` for trainings that cannot be compared. The warning
-#'   `gym_warning_seeds` says that there are fewer than five seeds: then intervals mean little.
+#' @section Errors: `gym_error_argument` for trainings that cannot be compared. With fewer than five
+#'   seeds a warning, `gym_warning_seeds`, says that intervals mean little.
 #' @references R. Agarwal, M. Schwarzer, P. S. Castro, A. Courville and M. G. Bellemare (2021), Deep
 #'   reinforcement learning at the edge of the statistical precipice, NeurIPS 34,
 #'   <https://arxiv.org/abs/2108.13264>; code: <https://github.com/google-research/rliable>.
@@ -127,7 +127,7 @@ curves_of <- function(trainings) {
 
 each_training <- function(x) if (inherits(x, "gym_trainings")) unname(x$trainings) else list(x)
 
-# All or none: otherwise there is nothing that both kinds could be compared by.
+# All have a target or none has: otherwise there is nothing to compare them by.
 stop_at_target <- function(trainings, call) {
   stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)
   if (any(stops) && !all(stops)) {
@@ -141,7 +141,7 @@ stop_at_target <- function(trainings, call) {
   any(stops)
 }
 
-# How many runs each training has in each environment.
+# The number of runs of each training in each environment.
 runs_each <- function(runs) table(paste(runs$training, runs$env_id, sep = "\r"))
 
 warn_few_seeds <- function(few) {

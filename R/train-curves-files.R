@@ -1,4 +1,4 @@
-# Learning curves from logs in files: ours, Stable-Baselines3's and CleanRL's.
+# Learning curves from log files: our own, Stable-Baselines3's and CleanRL's.
 
 read_curves <- function(path, call) {
   if (!file.exists(path)) {
@@ -14,13 +14,13 @@ read_curves <- function(path, call) {
       class = "gym_error_argument", argument = "...", value = path, call = call
     )
   }
-  # Runs whose seeds are not known are numbered.
+  # Runs with unknown seeds are numbered.
   unknown <- is.na(rows$seed)
   rows$seed[unknown] <- match(rows$run[unknown], unique(rows$run))
   rows[names(no_curve)]
 }
 
-# The rows of a folder or of those below it, `NULL` where there is no log; `run` tells runs apart.
+# The rows of a folder or of those below it, `NULL` if there is no log; `run` identifies the run.
 folder_curves <- function(path) {
   inside <- function(name) file.path(path, name)
   if (file.exists(inside("config.json")) && file.exists(inside("evaluations.csv"))) {
@@ -49,7 +49,7 @@ own_curves <- function(path) {
   run_rows(path, rows, env_id = config$env, seed = config$seed)
 }
 
-# Files are told apart by what stands in their first line.
+# The first line identifies the kind of file.
 file_curves <- function(file) {
   first <- readLines(file, 1L, warn = FALSE)
   if (!length(first)) {
@@ -78,7 +78,7 @@ progress_curves <- function(table, file) {
 }
 
 # Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode.
-# Environments side by side have a file each.
+# Parallel environments have a file each.
 monitor_curves <- function(files, path) {
   each <- lapply(files, function(file) {
     about <- jsonlite::fromJSON(sub("^#", "", readLines(file, 1L)))
@@ -97,7 +97,7 @@ monitor_curves <- function(files, path) {
 }
 
 # A table of TensorBoard has one run. One of Weights & Biases has the columns of one run, or a
-# column for each, named by it.
+# column for each, named after it.
 cleanrl_curves <- function(table, file) {
   if (all(c("Step", "Value") %in% names(table))) {
     return(run_rows(file, training_rows(table$Step, table$Value)))
@@ -120,8 +120,8 @@ training_rows <- function(steps, value) {
   rows[!is.na(rows$mean_return), ]
 }
 
-# A run with all columns. Where the log does not tell, the name of the run does: CleanRL's is made
-# of environment, script, seed and time.
+# A run with all columns. If the log lacks a value, it is taken from the name of the run: CleanRL's
+# consists of environment, script, seed and time.
 run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
   name <- basename(run)
   pattern <- "^(run-)?(.+)__(.+)__([0-9]+)__[0-9]+.*$"

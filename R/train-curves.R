@@ -1,33 +1,34 @@
-#' Put learning curves together in one table
+#' Combine learning curves in one table
 #'
-#' Takes the evaluations of all trainings and seeds, from results and from logs in files.
+#' Collect the evaluations of all trainings and seeds, from results and from log files.
 #'
-#' Files may be those of other programs:
+#' Files may come from other programs:
 #'
-#' * a folder with a log of ours (`train_agent(log = )`), or with one below it for each seed;
-#' * a folder of Stable-Baselines3's with `progress.csv` (its logger's), of which the evaluations
-#'   (`eval/mean_reward`) are taken, and where there are none the episodes of `monitor.csv` files
-#'   (its Monitor's, or those of `0.monitor.csv` and so on, one after the other by their time), and
-#'   else `rollout/ep_rew_mean`; or such a file by itself;
-#' * CSV files of CleanRL's `charts/episodic_return`: as Weights & Biases exports them (a column for
-#'   each run, or the history of one), or TensorBoard (`Wall time`, `Step`, `Value`); or a folder of
+#' * a folder with a log of this package (`train_agent(log = )`), or with one below it for each
+#'   seed;
+#' * a folder of Stable-Baselines3 with `progress.csv` (from its logger): the evaluations
+#'   (`eval/mean_reward`), or without them the episodes of `monitor.csv` files (from its Monitor, or
+#'   `0.monitor.csv` and so on, ordered by time), or otherwise `rollout/ep_rew_mean`; or such a file
+#'   itself;
+#' * CSV files of CleanRL's `charts/episodic_return`, as exported by Weights & Biases (a column for
+#'   each run, or the history of one) or TensorBoard (`Wall time`, `Step`, `Value`); or a folder of
 #'   them.
 #'
-#' What these programs log of their training is no evaluation: actions are drawn, and often mean
-#' returns of the last 100 episodes. Its `kind` is `"training"`.
+#' The training returns in these programs' logs are not evaluations: actions are drawn, and the
+#' returns are often means of the last 100 episodes. Their `kind` is `"training"`.
 #'
 #' @param ... Trainings of class `gym_training` or [gym_trainings], and folders or files, strings.
-#'   The name of an argument is that of its `training`; without one it is the variable's, the
-#'   file's, or the agent's.
-#' @return A data frame with a row for each evaluation: `training`, `env_id` (strings, `NA` where a
-#'   log does not tell), `seed` (a whole number; of other programs the one that a name such as
-#'   `seed-3` or CleanRL's `CartPole-v1__ppo__3__1700000000` has, else the run's number),
+#'   The name of an argument becomes its `training`; without a name it is that of the variable, the
+#'   file, or the agent.
+#' @return A data frame with a row for each evaluation: `training`, `env_id` (strings, `NA` if the
+#'   log does not have it), `seed` (a whole number; for other programs the one in a name such as
+#'   `seed-3` or CleanRL's `CartPole-v1__ppo__3__1700000000`, otherwise the run's number),
 #'   `iteration` (integer, 0 before the first, `NA` in logs of others), `steps` of the training,
 #'   `mean_return` (doubles), `kind` (`"curve"`, `"stopping"`, `"final"` or `"training"`), `se`,
-#'   `lower`, `upper` (its standard error and 95% interval, doubles, `NA` where unknown) and
-#'   `episodes` (integer).
-#' @section Errors: `gym_error_argument` for what is neither a training nor a log, and for a search
-#'   by the tutorial's rule, which has no evaluations.
+#'   `lower`, `upper` (its standard error and 95% interval, doubles, `NA` if unknown) and `episodes`
+#'   (integer).
+#' @section Errors: `gym_error_argument` for an object that is neither a training nor a log, and for
+#'   a search by the tutorial's rule, which has no evaluations.
 #' @seealso [compare_trainings()], and [plot()][plot.gym_trainings()] for a picture.
 #' @export
 #' @examplesIf gym:::can_start_server()

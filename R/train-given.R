@@ -1,11 +1,11 @@
-# Results as they were given to a function that compares them, with their names.
+# The results passed to a function that compares them, with their names.
 
-#' Take the arguments of the function that calls this, each result with a name
+#' Take the arguments of the calling function, each result with a name
 #'
-#' Results of which several can be compared have a name in the picture: that of the argument, of the
-#' variable, or else a label of their own. What is given beside them needs a name.
-#' @param first The function's first argument, a symbol. Like the others it may have another name,
-#'   that of its row or line: then it is missing.
+#' Results that can be compared have a name in the picture: that of the argument, of the variable,
+#' or a label of their own. Other arguments need a name.
+#' @param first The function's first argument, a symbol. It may be given under another name, that of
+#'   its row or line; then it is missing.
 #' @noRd
 arguments_as_written <- function(first, frame = rlang::caller_env(), call = frame) {
   listed <- as.call(c(quote(list), if (!eval(call("missing", first), frame)) first, quote(...)))
@@ -23,7 +23,7 @@ arguments_as_written <- function(first, frame = rlang::caller_env(), call = fram
   name_results(values, written)
 }
 
-# What has no name gets that of its variable, or else a label of its own.
+# A result without a name gets that of its variable, or a label of its own.
 name_results <- function(values, written) {
   names <- rlang::names2(values)
   for (i in which(!nzchar(names))) {
@@ -51,7 +51,7 @@ result_label <- function(x) {
 
 training_label <- function(x) sub(":.*", "", format(x$agent))
 
-#' Tell the results among the arguments of a picture from the others, of which there must be none
+#' Return the results among the arguments of a picture; any other argument is an error
 #' @return The results, a list with names.
 #' @noRd
 only_results <- function(values, class, call = rlang::caller_env(), unique = TRUE) {
