@@ -257,13 +257,17 @@ action_chooser <- function(agent, draw) {
   explores <- if (changes) 0 else epsilon
   function(values, taken) {
     if (changes) explores <<- scheduled(epsilon, taken, "epsilon")
-    if (explores > 0 && draw() < explores) {
-      return(draw_place(values > -Inf, draw()))
+    from <- if (explores > 0 && draw() < explores) {
+      which(values > -Inf)
+    } else {
+      best <- which.max(values)
+      if (!length(best) || anyNA(values)) abort_diverged()
+      equal <- which(values == values[[best]])
+      if (length(equal) == 1L) return(best)
+      equal
     }
-    best <- which.max(values)
-    if (!length(best)) abort_diverged()
-    equal <- values == values[[best]]
-    if (sum(equal) == 1L) best else draw_place(equal, draw())
+    # As draw_place() where all weigh the same, and twice as fast.
+    from[[as.integer(draw() * length(from)) + 1L]]
   }
 }
 

@@ -57,6 +57,13 @@ test_that("Q-learning moves a value towards the reward and the best value that f
   expect_identical(after$taken, 1)
 })
 
+test_that("what is done next is chosen by what was just learned, in the same state, too", {
+  agent <- started(agent_q(discount = 1, learning_rate = 1, epsilon = 0))
+  # From state 0 to itself: 2 becomes -5 + 2, which is less than 1. From state 1 the best is 5.
+  expect_identical(attr(observe(agent, step_of(0, 1, -5, 0)), "chosen"), 0L)
+  expect_identical(attr(observe(agent, step_of(0, 1, -5, 1)), "chosen"), 1L)
+})
+
 test_that("nothing follows on a termination, and what would follow on a truncation counts", {
   for (agent in list(
     agent_q(0.5, 0.1), agent_sarsa(0.5, 0.1, epsilon = 0),

@@ -79,7 +79,7 @@ page_seconds <- function(folder) {
   )
   told <- processx::run(
     file.path(normalizePath(folder), "tools/in-env"), c("Rscript", "--no-init-file", "-e", code),
-    wd = folder, stderr = NULL
+    wd = folder
   )
   as.numeric(utils::tail(strsplit(told$stdout, "\n")[[1L]], 1L))
 }
