@@ -305,7 +305,7 @@ shared_text <- function(definition) {
   if (!length(shared)) {
     return("What belongs to one episode must be kept in `self`, not outside of it.")
   }
+  id <- get0(shared[[1L]], place)$spec$id
   paste0("They share the environment `", shared[[1L]], "`: each makes one of its own when ",
-         "`reset()` has `if (is.null(self$own)) self$own <- gym_make(\"", get0(shared[[1L]], place)$spec$id,
-         "\", seed = 1)`.")
+         "`reset()` has `if (is.null(self$own)) self$own <- gym_make(\"", id, "\", seed = 1)`.")
 }

@@ -114,9 +114,9 @@ change_final <- function(out, observation, inside, outside, change) {
 }
 
 wrap_transform_action <- function(traits, func, action_space = NULL, call) {
-  transform <- new_transform("TransformAction", func, traits, call)
   changed <- change_spaces(traits, action_space = action_space %||% traits$action_space,
                            call = call)
+  transform <- new_transform("TransformAction", func, changed, call)
   inside <- traits$action_space
   fit <- function(action, n) {
     action <- form_batch(inside, action, n)
@@ -266,17 +266,18 @@ new_transform <- function(wrapper, func, traits, call) {
     })
     fit(narrow_values(value), n)
   }
-  compared <- FALSE
   transform$hint <- transform_hint(asked, traits$observation_space)
+  calls <- 0
+  compared_at <- 2^(0:10)
   transform$ask <- function(parts, n, fit) {
-    before <- if (!compared) session_random_state()
+    if (n > 1L) calls <<- calls + 1
+    compares <- n > 1L && calls %in% compared_at
+    before <- if (compares) session_random_state()
     value <- answer(parts, n, fit)
-    if (!compared && n > 1L) {
-      compared <<- TRUE
-      # Random numbers for a row alone would differ.
-      if (identical(session_random_state(), before)) {
-        compare_alone(transform, value, answer(last_row(parts[asked], n, traits), 1L, fit), n)
-      }
+    # Random numbers for a row alone would differ.
+    if (compares && identical(session_random_state(), before)) {
+      alone <- answer(last_row(parts[asked], n, traits), 1L, fit)
+      if (differs_alone(transform, value, alone, n)) compared_at <<- NULL
     }
     value
   }
@@ -329,10 +330,11 @@ last_row <- function(parts, n, traits) {
 
 # A function that takes `observation[1]` for a number of its own row would return wrong numbers
 # without an error.
-compare_alone <- function(transform, value, alone, n) {
+differs_alone <- function(transform, value, alone, n) {
   numbers <- function(x) unlist(x, use.names = FALSE)
   among <- numbers(if (is.list(value)) lapply(value, rows_of, n) else rows_of(value, n))
-  if (!isTRUE(all.equal(among, numbers(alone)))) {
+  differs <- !isTRUE(all.equal(among, numbers(alone)))
+  if (differs) {
     rlang::warn(
       c(paste0("`func` of ", transform$wrapper, " gives a row another value when it is alone (",
                describe_value(numbers(alone)), ") than among others (", describe_value(among),
@@ -341,6 +343,7 @@ compare_alone <- function(transform, value, alone, n) {
       class = "gym_warning_wrapper", call = NULL
     )
   }
+  differs
 }
 
 # Converts the result of a function to a batch.

@@ -99,6 +99,7 @@ wrapped_server_env <- R6Class(
 #' @noRd
 split_wrappers <- function(wrappers, call) {
   in_r <- wrapper_names(wrappers) %in% names(transforms)
+  check_takes_function(wrappers[!in_r], call)
   late <- which(!in_r & cumsum(in_r) > 0L)
   if (length(late)) {
     names <- c(wrappers[[late[[1L]]]][[1L]], wrappers[[which(in_r)[[1L]]]][[1L]])
@@ -110,6 +111,19 @@ split_wrappers <- function(wrappers, call) {
     )
   }
   list(server = wrappers[!in_r], r = wrappers[in_r])
+}
+
+# A function cannot be sent to the server.
+check_takes_function <- function(wrappers, call) {
+  wrong <- Filter(function(wrapper) any(vapply(wrapper, is.function, NA)), wrappers)
+  if (length(wrong)) {
+    name <- wrong[[1L]][[1L]]
+    gym_abort(
+      c(paste0(name, " is a wrapper of the server's, which takes no function of R."),
+        i = paste0("Those that do are ", paste(names(transforms), collapse = ", "), ".")),
+      class = "gym_error_argument", argument = "wrapper", value = name, call = call
+    )
+  }
 }
 
 calls_r <- function(env) any(wrapper_names(noted_wrappers(env)) %in% names(transforms))

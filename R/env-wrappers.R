@@ -85,7 +85,10 @@
 gym_wrap <- function(env_id, wrapper, ...) {
   check_string(wrapper)
   kwargs <- list(...)
-  check_dots_named(kwargs, "max_episode_steps = 50")
+  calls_r <- wrapper %in% names(transforms)
+  check_dots_named(
+    kwargs, if (calls_r) "func = function(reward) reward / 10" else "max_episode_steps = 50"
+  )
   if (is.environment(env_id) || is.list(env_id) && !inherits(env_id, "gym_wrapped")) {
     if (is_server_env(env_id)) {
       return(wrap_server_env(env_id, wrapper, kwargs, rlang::current_env()))
@@ -97,7 +100,7 @@ gym_wrap <- function(env_id, wrapper, ...) {
   if (registered) {
     check_r_wrapper(wrapper, rlang::current_env())
   }
-  if (wrapper %in% names(transforms)) {
+  if (calls_r) {
     check_wrapper_arguments(wrapper, kwargs, rlang::current_env())
     asked_parts(wrapper, kwargs$func, rlang::current_env())
   }

@@ -23,9 +23,9 @@
 #'
 #' The session itself plays what it cannot send, and says so once: an environment given as an
 #' object, or by a client other than the session's own; wrappers that remember something over
-#' episodes; episodes with frames; agents that learn from each step; a policy with a connection or a
-#' pointer. Plans whose workers end after each future (`multicore`, those of batchtools) train whole
-#' seeds only.
+#' episodes; episodes with frames; agents that learn from each step; a policy, or a wrapper's
+#' function, with a connection or a pointer. Plans whose workers end after each future (`multicore`,
+#' those of batchtools) train whole seeds only.
 #'
 #' If the package progressr is loaded, its handlers show the progress.
 #'

@@ -356,7 +356,7 @@ check_training <- function(settings, call) {
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
     gym_abort(
-      c(paste0("`seed` is one whole number, not ", length(settings$seed), "."),
+      c(paste0("`seed` is one whole number, not ", length(settings$seed), " of them."),
         i = "`seeds` trains once with each of several seeds."),
       class = "gym_error_argument", argument = "seed", value = settings$seed, call = call
     )

@@ -164,6 +164,11 @@ test_that("a function that takes a number of the first row for that of each is w
     gym_wrap("TransformReward", func = function(reward, observation) reward - observation[1])
   expect_warning(rollout(env, ahead, seed = 1), "gives a row another value when it is alone",
                  class = "gym_warning_wrapper")
+  # What is wrong in later steps only is found, too.
+  same <- gym_wrap(walk(TRUE), "TransformReward", func = function(reward, observation) {
+    reward - (reward > 2) * observation[1]
+  })
+  expect_warning(rollout(same, policy_random(), seed = 1), class = "gym_warning_wrapper")
   draws <- gym_wrap(walk(TRUE), "TransformReward", func = function(r) r + rnorm(length(r)))
   expect_no_warning(first <- rollout(draws, ahead, 5, seed = 1))
   expect_identical(rollout(draws, ahead, 5, seed = 1)$episodes, first$episodes)

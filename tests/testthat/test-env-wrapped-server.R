@@ -112,6 +112,9 @@ test_that("a wrapper of the server's over one in R is refused, and so are calls 
   expect_error(env_create(client, wrapped), "calls a function of R", class = "gym_error_argument")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", func = function(obs) 1), "needs `obs`")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", f = sqrt), "has no argument `f`")
+  expect_error(gym_wrap("CartPole-v1", "TransformReward", function(r) r), "as `func = function")
+  expect_error(gym_wrap("CartPole-v1", "RewardWrapper", func = function(r) r),
+               "takes no function of R", class = "gym_error_argument")
   lake <- gym_wrap("FrozenLake-v1", "TransformReward", func = function(r) r)
   expect_error(env_model(lake), class = "gym_error_no_model")
   bad <- gym_wrap("CartPole-v1", "TransformReward", func = function(r) r[-1])
