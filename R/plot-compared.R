@@ -27,12 +27,14 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
     switch(type, scores = scores_picture(object), profile = profile_picture(object),
            improvement = improvement_picture(object))
   }
+  bands <- object$by == "steps" || type == "profile"
+  shape <- if (bands) "band" else "bar"
   notes <- if (length(object$notes)) paste0("note: ", object$notes)
   ids <- unique(object$runs$env_id)
   picture +
     picture_labels(
       if (!anyNA(ids)) paste(ids, collapse = ", "),
-      paste0("line and band, or bar: ", percent_text(object$level), " interval"), caption = notes
+      paste0(shape, ": ", percent_text(object$level), " interval"), caption = notes
     ) +
     theme_gym()
 }
@@ -116,7 +118,7 @@ reached_picture <- function(x) {
       ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
     }) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
-    ggplot2::labs(x = training_steps_label, y = "share of runs that has reached the target")
+    ggplot2::labs(x = training_steps_label, y = "share that has reached the target")
 }
 
 match_profile <- function(runs, profile) {

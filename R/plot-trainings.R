@@ -59,7 +59,7 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     ) +
     ggplot2::geom_line(
       ggplot2::aes(y = .data$median), lines_of(curves, curves$steps >= curves$first_end),
-      linewidth = 0.3, show.legend = FALSE
+      linewidth = 0.4, show.legend = FALSE
     ) +
     # A line of one point is invisible.
     ggplot2::geom_pointrange(

@@ -58,7 +58,8 @@ curve_rows <- function(x, label, call) {
   } else if (inherits(x, "gym_training")) {
     given_trainings(list(x), call)
     evaluations <- cbind(
-      env_id = rep(x$env_id, nrow(x$evaluations)), seed = as.numeric(x$seed), x$evaluations
+      env_id = rep(x$env_id, nrow(x$evaluations)),
+      seed = rep(as.numeric(x$seed), nrow(x$evaluations)), x$evaluations
     )
     evaluations$steps <- evaluation_steps(x)
     evaluations[names(no_curve)]

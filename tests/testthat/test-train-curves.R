@@ -19,6 +19,9 @@ test_that("all evaluations of all trainings and seeds are one table", {
   expect_identical(curves[curves$training == "ars" & curves$seed == 2, -1], of_one[-1],
                    ignore_attr = TRUE)
   expect_identical(nrow(learning_curves()), 0L)
+  none <- one
+  none$evaluations <- no_evaluations
+  expect_identical(nrow(learning_curves(none)), 0L)
 })
 
 test_that("a log has the same evaluations as the result", {

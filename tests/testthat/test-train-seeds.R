@@ -62,7 +62,8 @@ test_that("each seed has its own checkpoint and log, and all go on from there", 
   expect_setequal(
     list.files(folder, recursive = TRUE),
     c(paste0("my.training-", 1:3, ".rds"),
-      paste0("log/seed-", rep(1:3, each = 2), "/", c("config.json", "progress.csv")))
+      paste0("log/seed-", rep(1:3, each = 3), "/",
+             c("config.json", "evaluations.csv", "progress.csv")))
   )
   unlink(file.path(folder, "my.training-2.rds"))
   idle <- fake_environment(reward = first_action)
