@@ -116,8 +116,8 @@ target_label <- function(target) paste("target", number_text(target))
 target_line <- function(target) {
   if (!is.null(target)) {
     ggplot2::geom_hline(
-      ggplot2::aes(yintercept = .data$target, colour = .data$label),
-      data.frame(target = target, label = target_label(target)), linetype = "dashed",
+      ggplot2::aes(yintercept = .data$target, colour = .data$key),
+      data.frame(target = target, key = target_label(target)), linetype = "dashed",
       linewidth = 0.7
     )
   }

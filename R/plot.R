@@ -66,6 +66,10 @@ plot.gym_solution <- show_picture
 #' @export
 plot.gym_state_map <- show_picture
 
+#' @rdname sweep_agent
+#' @export
+plot.gym_sweep <- show_picture
+
 #' @rdname plot.gym_training
 #' @export
 plot.gym_training <- show_picture

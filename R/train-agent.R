@@ -173,42 +173,61 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
                         client = gym_client()) {
   call <- rlang::current_env()
   check_agent(agent, call)
-  check_no_steps(...names(), call)
-  check_spelling(
-    ...names(), names(formals(train_agent)), !is.null(iterations) || !is.null(total_steps), call
-  )
-  kwargs <- list(...)
-  solved_by <- check_choice(solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
+  force(env)
+  # The client stays a promise: what needs no server must not start one.
+  given <- mget(setdiff(names(formals()), c("...", "client")), call)
+  job <- training_job(given, list(...), client, call)
+  if (is.null(seeds)) {
+    do_run(job$run, job$in_env, max_steps, client, progress, call)
+  } else {
+    train_seeds(job$in_env, job$settings, job$seeds, job$files, progress, client, call)
+  }
+}
+
+#' Prepare to train
+#' @param given The arguments of [train_agent()] but for `...` and `client`, a list.
+#' @param kwargs The environment's own arguments.
+#' @return A list: `settings`, `files`, as for [new_run()], `seeds`, and where these are `NULL` the
+#'   `run`; `in_env`, a function that makes the environment and calls a function with it.
+#' @noRd
+training_job <- function(given, kwargs, client, call) {
+  agent <- given$agent
+  env <- given$env
+  check_no_steps(names(kwargs), call)
+  budget <- !is.null(given$iterations) || !is.null(given$total_steps)
+  check_spelling(names(kwargs), names(formals(train_agent)), budget, call)
+  solved_by <- check_choice(given$solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
   online <- learns_online(agent)
-  check_flag(model)
-  settings <- list(
-    agent = agent, env = env, kwargs = kwargs,
-    # A learner makes its own.
-    policy = policy %||% if (!online) default_policy(agent),
-    iterations = iterations, total_steps = total_steps, episodes = episodes, target = target,
-    max_steps = max_steps, eval_every = eval_every, eval_episodes = eval_episodes,
-    evaluate = check_choice(evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
-    eval_episodes_curve = eval_episodes_curve, seed = seed, callback = callback,
-    # By the tutorial's rule the training is a search, and each candidate is an iteration, a round.
-    search = solved_by == "candidate",
-    may_sample = online && model
+  check_flag(given$model, arg = "model", call = call)
+  settings <- c(
+    given[c("agent", "env", "iterations", "total_steps", "episodes", "target", "max_steps",
+            "eval_every", "eval_episodes", "eval_episodes_curve", "seed", "callback")],
+    list(
+      kwargs = kwargs,
+      # A learner makes its own.
+      policy = given$policy %||% if (!online) default_policy(agent),
+      evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
+      # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
+      search = solved_by == "candidate",
+      may_sample = online && given$model
+    )
   )
   check_training(settings, call)
-  check_flag(progress)
-  check_flag(resume)
-  check_string(log, allow_null = TRUE)
-  check_string(checkpoint, allow_null = TRUE)
-  seeds <- plain_numbers(seeds)
-  if (!is.null(seeds)) check_training_seeds(seeds, seed, call)
+  for (name in c("progress", "resume")) check_flag(given[[name]], arg = name, call = call)
+  for (name in c("log", "checkpoint")) {
+    check_string(given[[name]], allow_null = TRUE, arg = name, call = call)
+  }
+  seeds <- plain_numbers(given$seeds)
+  if (!is.null(seeds)) check_training_seeds(seeds, given$seed, call)
   settings[c("what", "unit")] <- if (settings$search) {
     c("search", "round")
   } else {
     c("training", "iteration")
   }
-  settings$num_envs <- num_envs %||% if (online) learner_envs(env, agent)
-  settings$num_workers <- num_workers
-  log <- if (!is.null(log)) absolute_path(log)
-  files <- list(checkpoint = checkpoint, log = log, resume = resume)
+  settings$num_envs <- given$num_envs %||% if (online) learner_envs(env, agent)
+  settings$num_workers <- given$num_workers
+  log <- if (!is.null(given$log)) absolute_path(given$log)
+  files <- list(checkpoint = given$checkpoint, log = log, resume = given$resume)
   run <- if (is.null(seeds)) new_run(settings, files, call)
   settings$seed <- run$settings$seed
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
@@ -217,15 +236,13 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
     settings$sampled <- model_to_sample(settings, call)
   }
   settings$from_model <- !is.null(settings$sampled)
-  in_env <- function(use, max_steps = NULL) {
-    with_training_env(settings, use, max_steps, client, call)
-  }
-  if (is.null(seeds)) {
-    run$settings <- settings
-    do_run(run, in_env, max_steps, client, progress, call)
-  } else {
-    train_seeds(in_env, settings, seeds, files, progress, client, call)
-  }
+  if (!is.null(run)) run$settings <- settings
+  list(
+    settings = settings, files = files, seeds = seeds, run = run,
+    in_env = function(use, max_steps = NULL) {
+      with_training_env(settings, use, max_steps, client, call)
+    }
+  )
 }
 
 least_sub_envs <- 100

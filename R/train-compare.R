@@ -69,7 +69,7 @@
 #'   <https://arxiv.org/abs/2108.13264>; code: <https://github.com/google-research/rliable>.
 #'   E. L. Kaplan and P. Meier (1958), Nonparametric estimation from incomplete observations,
 #'   Journal of the American Statistical Association 53, 457-481.
-#' @seealso [learning_curves()]
+#' @seealso [learning_curves()], [sweep_agent()]
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' train <- function(agent) {

@@ -99,8 +99,12 @@ keeping_trainings <- function(code, trained, keep, result, what, files, call) {
   })
 }
 
-# Show each message once for all seeds.
+# Show each message once for all seeds. The error of a run of a sweep is its result.
 train_seed <- function(run, with_env, client, call) {
+  if (isTRUE(run$keeps_error)) {
+    run$keeps_error <- FALSE
+    return(tryCatch(train_seed(run, with_env, client, call), error = identity))
+  }
   withCallingHandlers(
     do_run(run, with_env, NULL, client, progress = FALSE, call),
     gym_message_interrupted = rlang::cnd_muffle,

@@ -1,0 +1,10 @@
+#' @param object A sweep.
+#' @rdname sweep_agent
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_sweep <- function(object, ...) {
+  check_dots_empty(...)
+  trained <- Filter(Negate(is.null), object$trainings)
+  trainings_picture(trained) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$label)) +
+    ggplot2::theme(legend.position = "none")
+}

@@ -1,0 +1,261 @@
+# Many settings of an agent, each with several seeds.
+
+#' Try settings of an agent
+#'
+#' Trains each setting with each seed, on the workers of the plan ([workers]) where there is one,
+#' and compares the settings as [compare_trainings()] does. A run that fails does not end the
+#' others.
+#'
+#' The best of many settings has also been lucky, and the more so the more were tried: what its
+#' seeds say of it is too good. So `report_seeds`, which must be others, train it once more, and
+#' their figures are what can be reported.
+#'
+#' The best setting is the one with the highest interquartile mean, or where trainings stop at a
+#' target the one that most runs reached it with, of equal ones the one with the smallest median of
+#' steps.
+#'
+#' With `folder` each run is kept in a file. After an interrupt, a kill or an error the same call
+#' goes on with what is missing. Settings may be added.
+#'
+#' @param agent The function that makes the agent, such as [agent_ars], without parentheses; or a
+#'   function of yours that does.
+#' @param env The environment, as for [train_agent()].
+#' @param settings A data frame with a row for each setting, as [expand.grid()] makes it, with the
+#'   arguments of `agent` as columns.
+#' @param seeds The seeds of tuning, different whole numbers.
+#' @param report_seeds `NULL`, the default, or the seeds with which the best setting is trained once
+#'   more, none of which is one of `seeds`.
+#' @param ... Further arguments of [train_agent()], such as `total_steps`, which one budget must be,
+#'   or `target`, and the environment's own. For `plot()` and `autoplot()` none.
+#' @param folder `NULL`, the default, or the folder to keep the runs in, which is made where it does
+#'   not exist.
+#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param client As for [train_agent()].
+#' @param x A sweep.
+#' @param row.names,optional Not used.
+#' @param main The title of the picture; `NULL`, the default, names the environment.
+#' @param xlab,ylab,xlim,ylim As for [plot.gym_rollout()].
+#' @return An object of class `gym_sweep`, a list with the elements
+#'   \describe{
+#'     \item{settings}{The settings, with a column `setting`, their names.}
+#'     \item{trainings}{A list with the [gym_trainings] of each setting, `NULL` where no run ended.}
+#'     \item{runs}{A data frame with a row for each run: `setting`, `seed` and `error` (the message,
+#'       `NA` where there was none).}
+#'     \item{comparison}{What [compare_trainings()] says of the settings, `NULL` where none was
+#'       trained.}
+#'     \item{best}{The name of the best setting.}
+#'     \item{reported}{Its [gym_trainings] with `report_seeds`, or `NULL`.}
+#'     \item{seeds, report_seeds}{As given.}
+#'     \item{interrupted}{Whether it was interrupted, a logical.}
+#'   } `as.data.frame()` gives the settings with the columns of the comparison's table, and `error`.
+#'   `plot()` draws the learning curves of all settings, a panel for each.
+#' @section Errors: `gym_error_argument` for an argument that is not what it should be;
+#'   `gym_error_checkpoint` where the folder has another sweep's runs.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' sweep <- sweep_agent(
+#'   agent_ars, "CartPole-v1", expand.grid(step_size = c(0.02, 0.1), noise = c(0.05, 0.1)),
+#'   seeds = 1:5, report_seeds = 1001:1005, total_steps = 2000, target = Inf
+#' )
+#' sweep
+#' plot(sweep)
+sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., folder = NULL,
+                        progress = rlang::is_interactive(), client = gym_client()) {
+  call <- rlang::current_env()
+  check_sweep(agent, settings, seeds, report_seeds, folder, call)
+  settings$setting <- setting_names(settings)
+  agents <- lapply(seq_len(nrow(settings)), function(row) {
+    arguments <- lapply(settings[row, names(settings) != "setting", drop = FALSE], `[[`, 1L)
+    tryCatch(rlang::exec(agent, !!!arguments), error = identity)
+  })
+  names(agents) <- settings$setting
+  failed <- vapply(agents, inherits, NA, "condition")
+  if (all(failed)) rlang::cnd_signal(agents[[1L]])
+  if (!is.null(folder)) dir.create(folder, showWarnings = FALSE, recursive = TRUE)
+  train <- function(agents, seeds) {
+    sweep_runs(agents, env, plain_numbers(seeds), list(...), folder, progress, client, call)
+  }
+  tuned <- train(agents[!failed], seeds)
+  runs <- rbind(tuned$runs, data.frame(
+    setting = rep(names(agents)[failed], each = length(seeds)), seed = rep(seeds, sum(failed)),
+    error = rep(vapply(agents[failed], conditionMessage, ""), each = length(seeds))
+  ))
+  done <- Filter(Negate(is.null), tuned$trainings)
+  comparison <- if (length(done)) rlang::exec(compare_trainings, !!!done, seed = 1)
+  best <- if (!is.null(comparison)) best_setting(comparison)
+  reported <- if (!is.null(report_seeds) && !is.null(best) && !tuned$interrupted) {
+    train(agents[best], report_seeds)
+  }
+  structure(
+    list(
+      settings = settings, trainings = tuned$trainings[settings$setting],
+      runs = rbind(runs, reported$runs), comparison = comparison, best = best,
+      reported = reported$trainings[[1L]], seeds = seeds, report_seeds = report_seeds,
+      interrupted = tuned$interrupted || isTRUE(reported$interrupted)
+    ),
+    class = "gym_sweep"
+  )
+}
+
+check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
+  if (!is.function(agent)) {
+    must <- "the function that makes the agent, such as `agent_ars` without parentheses"
+    abort_argument(agent, must, "agent", call)
+  }
+  if (!is.data.frame(settings) || !nrow(settings) || !length(settings)) {
+    abort_argument(settings, "a data frame with a row for each setting", "settings", call)
+  }
+  check_seeds(seeds, call)
+  check_string(folder, allow_null = TRUE, arg = "folder", call = call)
+  if (!is.null(report_seeds)) {
+    check_seeds(report_seeds, call)
+    both <- intersect(seeds, report_seeds)
+    if (length(both)) {
+      gym_abort(
+        c(paste0("Seed ", both[[1L]], " is one of `seeds` and of `report_seeds`."),
+          i = "What is reported must come from seeds that chose nothing."),
+        class = "gym_error_argument", argument = "report_seeds", value = report_seeds, call = call
+      )
+    }
+  }
+}
+
+setting_names <- function(settings) {
+  texts <- vapply(seq_len(nrow(settings)), function(row) {
+    values <- vapply(settings[row, , drop = FALSE], function(x) {
+      x <- x[[1L]]
+      if (length(x) == 1L && is.atomic(x)) format(x) else substr(rlang::hash(x), 1L, 8L)
+    }, "")
+    paste(names(settings), "=", values, collapse = ", ")
+  }, "")
+  make.unique(texts, " ")
+}
+
+#' Train agents with several seeds, all at once
+#' @param agents A list of agents with the names of their settings.
+#' @return A list: `trainings`, those of each agent, `runs`, a table, and `interrupted`.
+#' @noRd
+sweep_runs <- function(agents, env, seeds, dots, folder, progress, client, call) {
+  started <- proc.time()[["elapsed"]]
+  of_training <- setdiff(names(formals(train_agent)), c("agent", "env", "...", "client"))
+  given <- lapply(formals(train_agent)[of_training], eval, environment(train_agent))
+  given[intersect(names(dots), of_training)] <- dots[intersect(names(dots), of_training)]
+  kwargs <- dots[setdiff(names(dots), of_training)]
+  jobs <- lapply(names(agents), function(name) {
+    own <- c(list(agent = agents[[name]], env = env), given)
+    own["seeds"] <- list(seeds)
+    if (!is.null(folder)) {
+      own$checkpoint <- file.path(folder, paste0(gsub("[^A-Za-z0-9.=-]+", "_", name), ".rds"))
+    }
+    training_job(own, kwargs, client, call)
+  })
+  runs <- unlist(lapply(seq_along(jobs), function(at) {
+    lapply(seeds, function(seed) {
+      run <- run_of_seed(jobs[[at]]$settings, seed, jobs[[at]]$files, call)
+      c(run, list(job = at, keeps_error = TRUE))
+    })
+  }), recursive = FALSE)
+  show <- progress_bar(length(runs), "Run", shown = progress)
+  results <- list()
+  keep <- function(result) {
+    results[[length(results) + 1L]] <<- result
+    show(length(results))
+  }
+  max_steps <- jobs[[1L]]$settings$max_steps
+  train_here <- function() {
+    for (run in runs) {
+      in_env <- jobs[[run$job]]$in_env
+      result <- train_seed(run, function(use, ignored) in_env(use, max_steps), client, call)
+      if (isTRUE(result$interrupted)) rlang::interrupt()
+      keep(result)
+    }
+  }
+  train_all <- function(vector_env) {
+    if (seeds_go_to_workers(vector_env, jobs[[1L]]$settings)) {
+      train_in_futures(vector_env, runs, keep, call)
+      TRUE
+    } else {
+      FALSE
+    }
+  }
+  interrupted <- until_interrupted(
+    if (plan_kind() == "none" || !jobs[[1L]]$in_env(train_all, max_steps)) train_here(),
+    "Interrupted after {finished} of {total} run{?s}; what was finished is returned.",
+    function() length(results), length(runs)
+  )
+  sweep_results(results, runs, jobs, names(agents), proc.time()[["elapsed"]] - started, interrupted)
+}
+
+sweep_results <- function(results, runs, jobs, names, elapsed, interrupted) {
+  job <- vapply(runs[seq_along(results)], function(run) run$job, 0L)
+  errors <- vapply(results, function(result) {
+    if (inherits(result, "condition")) conditionMessage(result) else NA_character_
+  }, "")
+  seeds <- vapply(runs[seq_along(results)], function(run) as.numeric(run$settings$seed), 0)
+  trainings <- lapply(seq_along(jobs), function(at) {
+    whole <- results[job == at & is.na(errors)]
+    if (length(whole)) new_trainings(whole, jobs[[at]]$settings, elapsed, interrupted)
+  })
+  list(
+    trainings = stats::setNames(trainings, names), interrupted = interrupted,
+    runs = data.frame(setting = names[job], seed = seeds, error = errors)
+  )
+}
+
+best_setting <- function(comparison) {
+  table <- comparison$table
+  if (comparison$by == "scores") {
+    table <- table[table$statistic == "iqm", ]
+    table$training[[which.max(table$value)]]
+  } else {
+    table$training[[order(-table$reached / table$runs, table$median)[[1L]]]]
+  }
+}
+
+#' @rdname sweep_agent
+#' @export
+as.data.frame.gym_sweep <- function(x, row.names = NULL, optional = FALSE, ...) {
+  check_no_curve(...)
+  settings <- x$settings
+  tuning <- x$runs[x$runs$seed %in% x$seeds & !is.na(x$runs$error), ]
+  settings$error <- tuning$error[match(settings$setting, tuning$setting)]
+  table <- x$comparison$table
+  if (is.null(table)) {
+    return(settings)
+  }
+  merged <- merge(settings, table, by.x = "setting", by.y = "training", all.x = TRUE, sort = FALSE)
+  merged <- merged[order(match(merged$setting, settings$setting)), ]
+  row.names(merged) <- NULL
+  columns <- c("setting", setdiff(names(x$settings), "setting"), setdiff(names(table), "training"))
+  merged[c(columns, "error")]
+}
+
+#' @export
+print.gym_sweep <- function(x, ...) {
+  failed <- x$runs[!is.na(x$runs$error), ]
+  cat(
+    paste0("Sweep of ", count_of(nrow(x$settings), "setting"),
+           if (x$interrupted) ", interrupted: the same call goes on where it has a folder"),
+    paste0("Tuning seeds: ", numbers_text(x$seeds), ", which chose the setting"),
+    if (!is.null(x$comparison)) comparison_lines(x$comparison),
+    if (nrow(failed)) {
+      paste0(count_of(nrow(failed), "run"), " failed, the first, ", failed$setting[[1L]], ": ",
+             sub("\n.*", "", failed$error[[1L]]))
+    },
+    if (!is.null(x$best)) paste0("Best: ", x$best),
+    if (!is.null(x$reported)) {
+      c(paste0("Reporting seeds: ", numbers_text(x$report_seeds), ", which chose nothing"),
+        paste0("  ", trainings_lines(x$reported)[-(1:2)]))
+    } else {
+      "No reporting seeds: for the best setting these figures are too good, see `report_seeds`"
+    },
+    sep = "\n"
+  )
+  invisible(x)
+}
+
+# "1 to 5", or all of them.
+numbers_text <- function(x) {
+  row <- length(x) > 2L && all(diff(x) == 1)
+  if (row) paste(x[[1L]], "to", x[[length(x)]]) else paste(x, collapse = ", ")
+}

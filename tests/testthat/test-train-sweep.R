@@ -1,0 +1,101 @@
+sweep_fake <- function(settings = expand.grid(noise = c(0.1, 1), candidates = 2), ...,
+                       seeds = 1:5, env = fake_environment(reward = first_action)) {
+  suppressMessages(sweep_agent(
+    agent_hill_climb, env, settings, seeds = seeds, ..., iterations = 2, eval_episodes = 2,
+    target = Inf
+  ))
+}
+
+test_that("each setting is trained with each seed, as train_agent() does", {
+  sweep <- sweep_fake()
+  expect_identical(names(sweep$trainings),
+                   c("noise = 0.1, candidates = 2", "noise = 1, candidates = 2"))
+  one <- train_agent(agent_hill_climb(noise = 1, candidates = 2), iterations = 2, target = Inf,
+                     env = fake_environment(reward = first_action), eval_episodes = 2, seed = 3)
+  own <- sweep$trainings[[2]]$trainings[["3"]]
+  expect_identical(own$evaluations, one$evaluations)
+  expect_identical(own$policy, one$policy)
+  table <- as.data.frame(sweep)
+  expect_identical(unique(table$noise), c(0.1, 1))
+  expect_identical(nrow(table), 6L)
+  expect_identical(table$value, sweep$comparison$table$value)
+  expect_identical(nrow(sweep$runs), 10L)
+})
+
+test_that("tuning seeds choose, reporting seeds are others, and the print says which", {
+  sweep <- sweep_fake(report_seeds = 11:15)
+  iqm <- subset(as.data.frame(sweep), statistic == "iqm")
+  expect_identical(sweep$best, iqm$setting[[which.max(iqm$value)]])
+  expect_identical(names(sweep$reported$trainings), as.character(11:15))
+  expect_output(print(sweep), "Tuning seeds: 1 to 5, which chose the setting", fixed = TRUE)
+  expect_output(print(sweep), "Reporting seeds: 11 to 15, which chose nothing", fixed = TRUE)
+  expect_output(print(sweep_fake()), "No reporting seeds")
+  expect_error(sweep_fake(report_seeds = 5:9), "Seed 5", class = "gym_error_argument")
+})
+
+test_that("a setting that fails does not lose the others: its row says the error", {
+  settings <- data.frame(noise = c(0.1, -1))
+  sweep <- sweep_fake(settings)
+  table <- as.data.frame(sweep)
+  expect_match(table$error[table$noise == -1], "noise")
+  expect_true(all(is.na(table$error[table$noise == 0.1])))
+  expect_output(print(sweep), "5 runs failed, the first, noise = -1")
+  # An error in the middle of a run.
+  env <- fake_environment(reward = function(seed, step, action) if (seed %% 7 == 0) NaN else 1)
+  broken <- sweep_fake(settings[1, , drop = FALSE], env = env, seeds = 1:12)
+  failed <- !is.na(broken$runs$error)
+  expect_true(any(failed) && !all(failed))
+  expect_identical(length(broken$trainings[[1]]$trainings), sum(!failed))
+  expect_error(sweep_fake(settings[2, , drop = FALSE]), "noise", class = "gym_error_argument")
+})
+
+test_that("an interrupted sweep goes on with what is missing", {
+  folder <- withr::local_tempdir()
+  whole <- sweep_fake()
+  env <- fake_environment(reward = first_action)
+  step <- env$step
+  env$step <- function(action) if (length(env$seeds) == 60L) rlang::interrupt() else step(action)
+  begun <- suppressWarnings(sweep_fake(folder = folder, env = env), classes = "gym_warning_seeds")
+  expect_true(begun$interrupted)
+  expect_lt(nrow(begun$runs), 10L)
+  played <- fake_environment(reward = first_action)
+  again <- sweep_fake(folder = folder, env = played)
+  expect_false(again$interrupted)
+  expect_identical(as.data.frame(again), as.data.frame(whole))
+  fresh <- fake_environment(reward = first_action)
+  sweep_fake(env = fresh)
+  expect_lt(length(played$seeds), length(fresh$seeds))
+  expect_length(list.files(folder, "[.]rds$"), 10)
+})
+
+test_that("a picture has a panel for each setting", {
+  picture <- drawn(ggplot2::autoplot(sweep_fake(eval_every = 1, max_steps = 3)))
+  built <- ggplot2::ggplot_build(picture)
+  expect_identical(nrow(built$layout$layout), 2L)
+})
+
+test_that("arguments of a sweep are checked", {
+  env <- fake_environment()
+  bad <- function(...) expect_error(sweep_agent(...), class = "gym_error_argument")
+  bad(agent_ars(), env, data.frame(noise = 1), 1:5, iterations = 1)
+  bad(agent_ars, env, list(noise = 1), 1:5, iterations = 1)
+  bad(agent_ars, env, data.frame(noise = 1), c(1, 1), iterations = 1)
+  bad(agent_ars, env, data.frame(noise = 1), 1:5)
+})
+
+test_that("the runs of a sweep go to the workers of the plan", {
+  skip_unless_all()
+  skip_if_not_installed("future")
+  sweep <- function() {
+    suppressMessages(sweep_agent(
+      agent_hill_climb, "CartPole-v1", data.frame(noise = c(0.1, 0.5)), seeds = 1:2,
+      iterations = 2, eval_episodes = 2, target = Inf, max_steps = 20
+    ), classes = "message")
+  }
+  here <- suppressWarnings(sweep(), classes = "gym_warning_seeds")
+  old <- future::plan(future::multisession, workers = 2)
+  withr::defer(future::plan(old))
+  there <- suppressWarnings(sweep(), classes = "gym_warning_seeds")
+  expect_identical(as.data.frame(there), as.data.frame(here))
+  expect_identical(coef(there$trainings[[2]]), coef(here$trainings[[2]]))
+})
