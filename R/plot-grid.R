@@ -99,12 +99,24 @@ known_grid <- function(id) {
   if (length(found)) found else ""
 }
 
-check_directions <- function(directions, count, call) {
+# What the actions of these numbers are called: as it was said, as in the known grid, or by number.
+action_directions <- function(directions, known, numbers, call) {
+  directions <- directions %||% known_directions[[known]]
+  count <- length(numbers)
   if (!is.null(directions) && (!is.character(directions) || length(directions) != count)) {
     must <- paste("a string for each of", count_of(count, "action"))
     abort_argument(directions, must, "directions", call)
   }
-  directions
+  directions %||% as.character(numbers)
+}
+
+# Puts states into Taxi's city, or into a grid of so many columns.
+place_states <- function(cells, known, columns, own_columns, passenger, destination, walls, call) {
+  if (known == "Taxi" && is.null(columns)) {
+    taxi_cells(cells, passenger, destination, walls, call)
+  } else {
+    grid_cells(cells, columns %||% own_columns, call)
+  }
 }
 
 # Puts states into rows and columns, if the number of columns is known.

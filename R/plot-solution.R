@@ -86,18 +86,16 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   numbers <- state_numbers(x$model$action_space)
   if (inherits(x$policy, "gym_policy_table")) cells$action <- numbers[best_column(x$policy$q)]
   known <- known_grid(x$model$spec$id)
-  directions <- check_directions(directions %||% known_directions[[known]], ncol(x$q), call)
-  directions <- directions %||% as.character(numbers)
+  directions <- action_directions(directions, known, numbers, call)
   kinds <- state_kinds(x$model)
   cells$end <- end_kinds(x$model, kinds)
   cells$value[!kinds$reached] <- NA
   cells$does <- directions[match(cells$action, numbers)]
   cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
-  placed <- if (known == "Taxi" && is.null(columns)) {
-    taxi_cells(cells, passenger, destination, taxi_walls(x$model), call)
-  } else {
-    grid_cells(cells, columns %||% if (known != "") grid_columns(x$model), call)
-  }
+  placed <- place_states(
+    cells, known, columns, if (known != "") grid_columns(x$model), passenger, destination,
+    taxi_walls(x$model), call
+  )
   placed$cells$ink <- ink_on(placed$cells$value)
   placed$cells$text <- number_texts(placed$cells$value)
   c(placed, list(directions = directions))

@@ -80,24 +80,17 @@ state_map_data <- function(x, columns, directions, passenger, destination,
                            call = rlang::caller_env()) {
   check_count(columns, allow_null = TRUE, call = call)
   cells <- x$grid
-  count <- nrow(cells)
   known <- known_grid(x$env_id %||% "")
   numbers <- state_numbers(x$action_space)
-  directions <- check_directions(
-    directions %||% known_directions[[known]], as.integer(x$action_space$n), call
-  ) %||% as.character(numbers)
+  directions <- action_directions(directions, known, numbers, call)
   place <- match(cells$action, numbers)
   cells$does <- factor(directions[place], unique(directions))
   labels <- action_names(x$env_id, length(numbers), numbers[[1L]])
   cells$action <- factor(labels[place], labels)
   cells$ink <- "black"
-  placed <- if (known == "Taxi" && is.null(columns)) {
-    taxi_cells(cells, passenger, destination, integer(), call)
-  } else {
-    side <- sqrt(count)
-    own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
-    grid_cells(cells, columns %||% own, call)
-  }
+  side <- sqrt(nrow(cells))
+  own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
+  placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call)
   colours <- stats::setNames(action_colours(length(labels)), labels)
   c(placed, list(directions = directions, colours = colours))
 }

@@ -13,7 +13,8 @@
 naming <- function(space, batch = FALSE) {
   labels <- space$names
   if (has_parts(space)) {
-    naming_of_parts(lapply(unname(space$spaces), naming, batch), if (is_tuple(space)) labels)
+    parts <- lapply(unname(space$spaces), naming, batch)
+    naming_of_parts(parts, if (inherits(space, "gym_space_tuple")) labels)
   } else if (is.null(labels) || !inherits(space, "gym_space_box")) {
     # A single number has none: it would be printed with its name at each step.
     NULL
@@ -30,8 +31,6 @@ naming <- function(space, batch = FALSE) {
     }
   }
 }
-
-is_tuple <- function(space) inherits(space, "gym_space_tuple")
 
 naming_of_parts <- function(parts, labels) {
   named <- which(!vapply(parts, is.null, NA))

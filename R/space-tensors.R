@@ -37,8 +37,6 @@ has_tensors.gym_space_tuple <- function(space) all(vapply(space$spaces, has_tens
 #' @exportS3Method
 has_tensors.gym_space_dict <- has_tensors.gym_space_tuple
 
-tensors_pay <- function(space) has_tensors(space) && count_numbers(space) >= tensors_pay_from
-
 count_numbers <- function(space) {
   if (inherits(space, "gym_space_array")) {
     prod(space$shape)
