@@ -62,7 +62,7 @@ test_that("a step's answer says which field is wrong", {
     c(info = "3"), c(info = "[1,2]"),
     c(observation = "[0]"), c(observation = "[0,1,2]"), c(observation = "[0,null]"),
     c(observation = '["a","b"]'), c(observation = "null"), c(observation = "[[0,1],[2,3]]"),
-    c(observation = "[0,{}]")
+    c(observation = "[0,{}]"), c(observation = "[0.5]"), c(observation = "[0.5,1,2]")
   )
   for (field in wrong) {
     say(server, "/v1/envs/0a1b2c3d/step/" = answers(good_step(field)))
