@@ -52,7 +52,7 @@ learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), e
                          learners = 2000, horizon = NULL, seed = NULL) {
   problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
   if (is.null(problem)) {
-    abort_argument(env, "a bandit, as `bandit()` makes it", "env", rlang::current_env())
+    abort_argument(env, "a bandit made by `bandit()`", "env", rlang::current_env())
   }
   method <- check_choice(method[1L], c("epsilon_greedy", "ucb", "gradient"), arg = "method")
   check_number(epsilon, min = 0, max = 1)

@@ -13,8 +13,8 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
   space <- policy$observation_space
   if (length(space$shape) > 1L) {
     gym_abort(
-      paste0("A gradient is followed where observations are vectors, and those of ", policy$env_id,
-             " are of ", format(space), "."),
+      paste0("Agents that follow gradients need observations that are vectors; those of ",
+             policy$env_id, " are of ", format(space), "."),
       class = "gym_error_argument", argument = "env", call = NULL
     )
   }
@@ -171,9 +171,9 @@ check_values <- function(policy, name) {
   outputs <- policy$sizes[[length(policy$sizes)]]
   if (!inherits(space, "gym_space_discrete")) {
     gym_abort(
-      c(paste0(name, " finds a value for each action of a Discrete space, and ", policy$env_id,
-               " takes actions of ", format(space), "."),
-        i = "`agent_ppo()` learns there."),
+      c(paste0(name, " learns a value for each action of a Discrete space, but the actions of ",
+               policy$env_id, " are of ", format(space), "."),
+        i = "Use `agent_ppo()` for these actions."),
       class = "gym_error_argument", argument = "env", call = NULL
     )
   }

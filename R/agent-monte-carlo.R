@@ -67,7 +67,7 @@ check_importance <- function(importance, target_policy, temperature, exploring_s
   if (importance == "none") {
     if (!is.null(target_policy)) {
       gym_abort(
-        "`target_policy` is learned from other episodes than its own: give `importance`, too.",
+        "`target_policy` needs `importance`, because another policy plays the episodes.",
         class = "gym_error_argument", argument = "target_policy", value = target_policy,
         call = call
       )
@@ -80,8 +80,8 @@ check_importance <- function(importance, target_policy, temperature, exploring_s
   }
   if (!is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)) {
     gym_abort(
-      paste("`importance` is for `epsilon`: leave out `temperature`, `exploring_starts` and",
-            "`learning_rate`."),
+      paste("`importance` works with `epsilon` only: leave out `temperature`,",
+            "`exploring_starts` and `learning_rate`."),
       class = "gym_error_argument", argument = "importance", value = importance, call = call
     )
   }

@@ -138,11 +138,11 @@ preset_hints <- function(env, kwargs) {
                   presets$kwargs, collapse = ", ")
   c(
     i = if (NROW(presets)) {
-      paste0("The presets of ", env, " have one, but are for other arguments or another agent: ",
+      paste0("There are presets of ", env, " for other arguments or another agent: ",
              known, ".")
     },
     i = if (length(kwargs)) {
-      paste0("These were taken for the environment's own: ",
+      paste0("These were taken for arguments of the environment: ",
              paste0("`", names(kwargs), "`", collapse = ", "), ".")
     }
   )

@@ -63,8 +63,8 @@ check_explores <- function(epsilon, call) {
   is_zero <- function(taken) isTRUE(tryCatch(epsilon(taken) == 0, error = function(cnd) FALSE))
   if (is.function(epsilon) && all(vapply(c(0, 10^(0:8)), is_zero, NA))) {
     gym_abort(
-      c("`epsilon` is a schedule that is 0 from the first step on, so that it never explores.",
-        i = "Begin above 0, as `schedule_linear(1, 0.1, duration = 10000)`, or give the number 0."),
+      c("`epsilon` is a schedule that is 0 from the first step, so the agent never explores.",
+        i = "Start above 0, as in `schedule_linear(1, 0.1, duration = 10000)`, or give 0."),
       class = "gym_error_argument", argument = "epsilon", value = epsilon, call = call
     )
   }

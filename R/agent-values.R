@@ -33,7 +33,7 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   check_string(settings$mask, arg = "mask", allow_null = TRUE, call = call)
   if (!is.null(settings$mask) && !is.null(features)) {
     gym_abort(
-      "`mask` is for a table, not for features: a table keeps what is forbidden where.",
+      "`mask` works with a table only, not with features.",
       class = "gym_error_argument", argument = "mask", value = settings$mask, call = call
     )
   }
@@ -56,9 +56,9 @@ agent_start.gym_value_learner <- function(agent, policy) {
   call <- NULL
   if (!inherits(policy$action_space, "gym_space_discrete")) {
     gym_abort(
-      c(paste0("A learner of values needs actions that can be counted, not ",
+      c(paste0("A learner of values needs Discrete actions, not ",
                format(policy$action_space), "."),
-        i = "`search_ars()` and `search_cem()` learn actions that are numbers of a range."),
+        i = "`search_ars()` and `search_cem()` learn actions of a Box."),
       class = "gym_error_argument", argument = "env", call = call
     )
   }
@@ -89,7 +89,7 @@ first_weights <- function(agent, policy) {
       as.double(rows) * columns,
       paste0("Learning a value for each of ", count_of(columns, "action"), " in ",
              count_of(rows, "state")), NULL, "env",
-      "With `features`, as `tile_coding()` makes them, states share a value."
+      "With `features`, such as `tile_coding()`, states share a value."
     )
     weights <- matrix(as.double(agent$initial) / agent$basis$each, rows, columns)
   }
@@ -103,7 +103,7 @@ first_weights <- function(agent, policy) {
 check_first_table <- function(agent, policy) {
   if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
     gym_abort(
-      "A table to begin with is for learners of a table with a column for each action.",
+      "Only a learner of a table with a column for each action can start with a table.",
       class = "gym_error_argument", argument = "policy", value = policy, call = NULL
     )
   }
@@ -273,8 +273,8 @@ action_chooser <- function(agent, draw) {
 
 abort_diverged <- function() {
   gym_abort(
-    c("The values that are learned have become infinite.",
-      i = "Take a smaller `learning_rate`, or other `features`."),
+    c("The learned values have become infinite.",
+      i = "Use a smaller `learning_rate`, or other `features`."),
     class = "gym_error_agent", call = NULL
   )
 }
@@ -340,7 +340,7 @@ state_values <- function(x, actions = FALSE) {
   space <- if (inherits(agent, "gym_value_learner")) agent$spaces$observation_space
   discrete <- inherits(space, "gym_space_discrete")
   if (is.null(space) || is.null(agent$weights) || !is.null(agent$features) && !discrete) {
-    must <- "what was learned by a table, as `learn_q()` returns it"
+    must <- "the result of a learner of a table, such as `learn_q()`"
     abort_argument(x, must, "x", rlang::current_env())
   }
   q <- value_table(agent)

@@ -41,7 +41,7 @@ is_av_there <- function() requireNamespace("av", quietly = TRUE)
 check_writes_mp4 <- function(call) {
   if (!is_av_there() && is.null(find_ffmpeg())) {
     gym_abort(
-      c("To write an MP4 file takes the package av or the program ffmpeg.",
+      c("Writing an MP4 file requires the package av or the program ffmpeg.",
         i = "`install.packages(\"av\")` installs the package; a .gif file needs neither."),
       class = "gym_error_argument", argument = "file", call = call
     )

@@ -132,7 +132,7 @@ as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frame
 check_one_framed <- function(num_envs, frames, call = rlang::caller_env()) {
   if (frames && isTRUE(num_envs > 1)) {
     gym_abort(
-      c(paste0("`num_envs` must be 1 where frames are kept, not ", num_envs, "."),
+      c(paste0("`num_envs` must be 1 to keep frames, not ", num_envs, "."),
         i = "Leave it out, or leave out `frames = TRUE`."),
       class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
     )
@@ -143,9 +143,9 @@ check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env
   given <- c(if (!is.null(num_envs)) "num_envs", names(arguments), if (length(arguments)) "...")
   if (length(given)) {
     gym_abort(
-      c(paste0("`", given[[1L]], "` is for an environment that is made here, and this ",
+      c(paste0("`", given[[1L]], "` is for an environment given by its id, but this ",
                environment_label(env), " was made before."),
-        i = "Name it by its id, or give the argument to `gym_make()`."),
+        i = "Give its id instead, or pass the argument to `gym_make()`."),
       class = "gym_error_argument", argument = given[[1L]], call = call
     )
   }

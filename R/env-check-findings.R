@@ -20,7 +20,7 @@ look_at_environment <- function(check, seed) {
   remembers <- remembering(check$env$spec$wrappers)
   if (length(remembers)) {
     note_finding(check, "seeds", paste0(
-      remembers[[1L]], " remembers earlier episodes: the same seed gives other numbers later."
+      remembers[[1L]], " remembers earlier episodes: later the same seed gives other numbers."
     ), severity = "note")
   } else {
     look_at_repetition(check, first, seed)
@@ -49,7 +49,7 @@ look_at_draws <- function(check, states, others) {
   if (length(set)) {
     note_finding(check, "seeds", paste0(
       "`", set[[1L]], "()` sets the state of the random generator, as `set.seed()` does, so that ",
-      "every episode draws the same numbers whatever its seed: leave that out."
+      "every episode draws the same numbers for any seed: remove that call."
     ))
   }
 }
@@ -105,7 +105,7 @@ look_at_space <- function(check, kind) {
 look_at_part <- function(check, space, path) {
   note <- function(...) note_finding(check, "spaces", paste0(...), severity = "note")
   if (inherits(space, "gym_space_undescribed")) {
-    note("Of `", path, "` the server tells no more than its name, ", space$name, ".")
+    note("The server gives only the name of `", path, "`, ", space$name, ".")
   } else if (has_parts(space)) {
     if (!length(space$spaces)) {
       note("`", path, "` is a ", space$name, " without parts.")
@@ -144,7 +144,7 @@ look_at_end <- function(check, episodes) {
   } else if (all(!ended & lengths == check$limit)) {
     note_finding(check, "end", paste0(
       "No episode ended within ", count_of(check$limit, "step"), ": an environment that never ",
-      "ends is played with `max_steps`, as in `rollout(env, policy, max_steps = 200)`."
+      "ends needs `max_steps`, as in `rollout(env, policy, max_steps = 200)`."
     ), severity = "note")
   }
 }
@@ -290,7 +290,7 @@ look_at_copies <- function(check, first, seed) {
   )
   if (moved) {
     note_finding(check, "copies", paste0(
-      "Copies of the environment that play side by side, as in `rollout()`, move each other. ",
+      "Copies of the environment that are played together, as in `rollout()`, move each other. ",
       shared_text(check$definition)
     ))
   }
@@ -303,7 +303,7 @@ shared_text <- function(definition) {
                       globalenv())
   shared <- Filter(function(name) is_playable(get0(name, place)), used)
   if (!length(shared)) {
-    return("What belongs to one episode must be kept in `self`, not outside of it.")
+    return("Keep the state of an episode in `self`, not outside it.")
   }
   id <- get0(shared[[1L]], place)$spec$id
   paste0("They share the environment `", shared[[1L]], "`: each makes one of its own when ",

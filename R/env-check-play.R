@@ -15,8 +15,8 @@ call_and_look <- function(check, topic, place, code) {
   })
   if (!identical(session_random_state(), before)) {
     note_finding(check, "seeds", paste0(
-      "`", topic, "()` moves the session's random generator, so that the seed of an episode does ",
-      "not fix it: in an environment made by `gym_env()` it would draw from a generator of its own."
+      "`", topic, "()` uses the session's random generator, so the seed does not fix the episode: ",
+      "make the environment by `gym_env()`, which gives it its own generator."
     ), key = "session")
   }
   value
@@ -127,14 +127,14 @@ lower_first <- function(text) paste0(lower_case(substr(text, 1L, 1L)), substring
 look_at_step <- function(check, out, place) {
   note <- function(key, ...) note_finding(check, "step", paste0(...), key = key)
   if (!is.list(out)) {
-    note("list", "`step()` must return a list, and returned ", describe_argument(out), " in ",
+    note("list", "`step()` must return a list, but returned ", describe_argument(out), " in ",
          place, ".")
     return()
   }
   absent <- setdiff(c("observation", "reward", flags), names(out))
   for (name in absent) {
-    note(name, "`step()` must return a list with an element `", name, "`, and in ", place,
-         " there is none.")
+    note(name, "`step()` must return a list with an element `", name, "`, which is missing in ",
+         place, ".")
   }
   wrong <- wrong_parts(out, check$env[["num_envs"]] %||% 1L, finite = TRUE)
   for (name in setdiff(names(wrong), absent)) {

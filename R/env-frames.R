@@ -37,9 +37,9 @@ check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
     gym_abort(
-      c(paste0("Frames are kept of an environment without sub-environments, and this ", label,
+      c(paste0("Only an environment without sub-environments can keep frames, but this ", label,
                " has ", count_of(env$num_envs, "sub-environment"), "."),
-        i = paste0("Make it without `num_envs`, or name it by its id.")),
+        i = paste0("Make it without `num_envs`, or give its id instead.")),
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
@@ -51,7 +51,7 @@ check_draws <- function(env, call) {
   if (!draws) {
     gym_abort(
       c(paste0("There are no frames to keep: ", label, " cannot be drawn."),
-        i = "Leave `frames = TRUE` out; `steps = TRUE` keeps what it observes."),
+        i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations."),
       class = "gym_error_argument", argument = "frames", value = TRUE, call = call
     )
   }

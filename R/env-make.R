@@ -157,7 +157,7 @@ explain_unknown_argument <- function(cnd, given, call) {
     c(
       paste0("Neither `gym_make()` nor the environment has an argument `", name, "`."),
       i = if (length(near)) paste0("Did you mean `", near, "`?"),
-      i = if (!length(near)) "The environment's own documentation lists those that it has."
+      i = if (!length(near)) "See the environment's documentation for its arguments."
     ),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
     status = cnd$status, code = cnd$code, argument = name, call = call

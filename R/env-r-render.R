@@ -18,8 +18,8 @@ render_r_env <- function(sub_env, call = rlang::caller_env()) {
 check_renders <- function(sub_env, call = rlang::caller_env()) {
   if (is.null(sub_env$render)) {
     gym_abort(
-      c(paste0("There is nothing to see of ", sub_env$traits$spec$id, ": it cannot be drawn."),
-        i = "An environment in R is drawn by its function `render`, see `?gym_env`."),
+      c(paste0(sub_env$traits$spec$id, " cannot be drawn."),
+        i = "Give it a function `render` that draws it, see `?gym_env`."),
       class = "gym_error_argument", argument = "render", call = call
     )
   }

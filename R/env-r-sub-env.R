@@ -49,8 +49,8 @@ reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number =
                           call = rlang::caller_env()) {
   if (!is.null(options) && !sub_env$takes_options) {
     gym_abort(
-      c(paste0("`reset()` of ", sub_env$traits$spec$id, " takes no options."),
-        i = "It takes some when it has an argument `options`."),
+      c(paste0("`reset()` of ", sub_env$traits$spec$id, " does not accept options."),
+        i = "Give it an argument `options` to accept them."),
       class = "gym_error_argument", argument = "options", value = options, call = call
     )
   }
@@ -89,7 +89,7 @@ raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::calle
 check_was_reset <- function(sub_env, call) {
   if (is.na(sub_env$taken)) {
     gym_abort(
-      c(paste0(sub_env$traits$spec$id, " has not been reset, so that it has no episode yet."),
+      c(paste0(sub_env$traits$spec$id, " has not been reset."),
         i = "`env$reset()` starts an episode."),
       class = "gym_error_argument", argument = "env", call = call
     )

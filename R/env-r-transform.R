@@ -309,7 +309,7 @@ asked_parts <- function(wrapper, func, call) {
     gym_abort(
       c(paste0("`func` of ", wrapper, " must be a function of `", known[[1L]], "`, and this one ",
                if (length(needed)) paste0("needs `", needed[[1L]], "`.") else "has no argument."),
-        i = paste0("By the names of its arguments it can ask for `",
+        i = paste0("The names of its arguments can be `",
                    paste(known, collapse = "`, `"), "`.")),
       class = "gym_error_argument", argument = "func", value = func, call = call
     )
@@ -369,7 +369,7 @@ refuse_misfit <- function(transform, space, value, n, arg, given) {
                describe_argument(value)),
         value, parent = cnd, class = "gym_error_space",
         fix = if (arg == "observation_space" && is.null(given)) {
-          "Where it returns others than it gets, `observation_space` says which."
+          "If it changes the space of observations, give the new one as `observation_space`."
         }
       )
     }

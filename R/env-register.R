@@ -143,7 +143,7 @@ make_entry <- function(id, arguments, call) {
     gym_abort(
       c(paste0("The `entry_point` of ", id, " must return an environment, not ",
                describe_argument(env), "."),
-        i = "`gym_env()` makes one of functions, a class that inherits from `GymEnv` another."),
+        i = "Make one by `gym_env()`, or by a class that inherits from `GymEnv`."),
       class = "gym_error_argument", argument = "entry_point", value = env, call = call
     )
   }
@@ -240,9 +240,9 @@ check_for_r <- function(id, servers, call = rlang::caller_env()) {
 with_num_envs <- function(env, num_envs, id, call) {
   if (!isTRUE(definition_of(env)$vectorized)) {
     gym_abort(
-      c(paste0("`num_envs = ", num_envs, "` takes functions for all sub-environments at once, and ",
+      c(paste0("`num_envs = ", num_envs, "` needs functions for all sub-environments at once, but ",
                "those of ", id, " are for one."),
-        i = "`rollout()` and searches play several of it side by side, by their `num_envs`."),
+        i = "`rollout()` and searches play several copies of it, see their `num_envs`."),
       class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
     )
   }
@@ -310,7 +310,7 @@ check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
     id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
     gym_abort(
-      c(paste0(id, " is an environment written in R, which no server can see."),
+      c(paste0(id, " is an environment written in R, which a server cannot make."),
         i = paste0("`gym_make(\"", id, "\")` makes it here.")),
       class = "gym_error_argument", argument = "env_id", value = env_id, call = call
     )

@@ -138,13 +138,13 @@ check_step_parts <- function(out, n, where, call,
   absent <- setdiff(needed, names(out))
   if (length(absent)) {
     has <- if (length(names(out))) paste0("; it has `", paste(names(out), collapse = "`, `"), "`")
-    abort_step(paste0("What ", where, " returned lacks `", absent[[1L]], "`", has), out, call)
+    abort_step(paste0("The result of ", where, " lacks `", absent[[1L]], "`", has), out, call)
   }
   if (!"truncated" %in% needed) out$truncated <- out$truncated %||% logical(n)
   wrong <- wrong_parts(out, n)
   if (length(wrong)) {
     name <- names(wrong)[[1L]]
-    problem <- paste0("The element `", name, "` of what ", where, " returned must be ",
+    problem <- paste0("The element `", name, "` of the result of ", where, " must be ",
                       wrong[[1L]], ", not ", describe_argument(out[[name]]))
     abort_step(problem, out, call)
   }
@@ -198,7 +198,7 @@ warn_step_after_end <- function(what, call) {
   rlang::warn(
     c(
       paste(what, "took a step after the end of its episode."),
-      i = "What comes of it is undefined: reset the environment first."
+      i = "The result is undefined: reset the environment first."
     ),
     class = "gym_warning_step_after_done",
     call = call

@@ -107,9 +107,8 @@ first_supported <- function(make, counts) {
 check_no_workers <- function(num_workers, call) {
   if (isTRUE(num_workers > 0)) {
     gym_abort(
-      c(paste0("`num_workers = ", num_workers, "` is for sub-environments that are environments ",
-               "of their own, and this environment has a vector implementation, which plays all ",
-               "of them in one process."),
+      c(paste0("`num_workers = ", num_workers, "` has no effect on an environment with its own ",
+               "vector implementation, which plays all sub-environments in one process."),
         i = "Leave it out."),
       class = "gym_error_argument", argument = "num_workers", value = num_workers, call = call
     )

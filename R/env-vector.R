@@ -133,7 +133,7 @@ check_has_sub_envs <- function(num_envs, x, arg, call) {
     gym_abort(
       c(
         paste0("`", arg, "` is for an environment with sub-environments."),
-        i = "Say how many with `num_envs`."
+        i = "Give their number as `num_envs`."
       ),
       class = "gym_error_argument", argument = arg, value = x, call = call
     )

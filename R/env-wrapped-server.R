@@ -140,8 +140,8 @@ check_no_transforms <- function(wrappers, call) {
   name <- intersect(wrapper_names(wrappers), names(transforms))
   if (length(name)) {
     gym_abort(
-      c(paste0(name[[1L]], " calls a function of R, which no instance on a server can."),
-        i = "`gym_make()` makes an environment that plays with it."),
+      c(paste0(name[[1L]], " calls an R function, which an instance on a server cannot do."),
+        i = "Use `gym_make()` instead of the classic calls."),
       class = "gym_error_argument", argument = "wrappers", value = name, call = call
     )
   }

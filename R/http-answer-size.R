@@ -41,7 +41,7 @@ limit_answer_size <- function(handle, state) {
 # Checks the size of a JSON text before it is parsed.
 check_json_size <- function(content) {
   if (length(content) > small_answer && length(content) > max_answer_bytes() * json_share) {
-    abort_too_large(json_share, "It is JSON, of which R makes much: that may have a sixteenth.")
+    abort_too_large(json_share, "R needs much memory for JSON: its limit is a sixteenth.")
   }
 }
 
@@ -52,7 +52,7 @@ abort_too_large <- function(share = 1, reason = NULL, base = NULL, call = NULL) 
       paste0("The answer of the server", if (!is.null(base)) paste0(" at ", base),
              " is larger than ", count_of(floor(most), "byte"), "."),
       x = reason,
-      i = "`options(gym.max_answer_bytes = )` sets how large an answer may be."
+      i = "`options(gym.max_answer_bytes = )` sets the limit."
     ),
     class = "gym_error_connection", url = base, call = call
   )

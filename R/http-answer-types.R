@@ -2,7 +2,7 @@
 
 abort_answer <- function(problem, call = NULL) {
   gym_abort(
-    c("The server's answer cannot be right.", x = paste0(problem, ".")),
+    c("The server's answer is invalid.", x = paste0(problem, ".")),
     class = "gym_error_connection", problem = problem, call = call
   )
 }
@@ -98,7 +98,7 @@ check_about <- function(about) {
 #' @noRd
 listed_column <- function(listed, name, missing, is_right, must) {
   if (!is.list(listed) || !all(vapply(listed, is_object, NA))) {
-    abort_answer("It is no list of objects")
+    abort_answer("It is not a list of objects")
   }
   vapply(listed, function(one) {
     value <- one[[name]] %||% return(missing)
@@ -148,7 +148,7 @@ check_numbers <- function(values, dtype, shape) {
   # NaN is a number. Do not read the bits of an integer64 as a double.
   missing <- !is.object(values) && anyNA(values) && any(is.na(values) & !is.nan(values))
   if (!is.numeric(values) && !is.logical(values) || missing) {
-    abort_answer(paste("A value has something that is no", dtype %||% "number"))
+    abort_answer(paste("A value contains something that is not", dtype %||% "number"))
   }
   values
 }
@@ -173,7 +173,7 @@ check_text <- function(value) {
 
 check_list <- function(value, n, what) {
   if (!is.list(value) || length(value) != n) {
-    abort_answer(paste("A value of", what, "is no list of", n))
+    abort_answer(paste("A value of", what, "is not a list of", n))
   }
 }
 
@@ -191,7 +191,7 @@ check_frame <- function(values) {
 check_png <- function(file) {
   signature <- as.raw(c(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a))
   if (!is.raw(file) || length(file) < 24L || !identical(file[1:8], signature)) {
-    abort_answer("It is no PNG file")
+    abort_answer("It is not a PNG file")
   }
   size <- png_size(file)
   if (anyNA(size) || any(size < 1L) || 4 * prod(size) > max_answer_bytes()) {

@@ -45,9 +45,9 @@ check_classic_fields <- function(client, fields, known, call) {
 abort_classic <- function(client, lacks, call) {
   gym_abort(
     c(
-      paste0("The server at ", client$remote_base, " knows the protocol of gym-http-api alone, ",
+      paste0("The server at ", client$remote_base, " has only the protocol of gym-http-api, ",
              "which has ", lacks, "."),
-      i = "`gym_server_start()` starts a server that has more."
+      i = "`gym_server_start()` starts a newer server."
     ),
     class = "gym_error_http", code = "not_supported", call = call
   )

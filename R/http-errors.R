@@ -80,11 +80,11 @@ abort_connection <- function(url, reason, call, reached = TRUE) {
 
 hanging_hint <- function(base) {
   paste(
-    "It took the call, but works longer on it than the client's `timeout`, or it hangs.",
+    "It accepted the call, but needs longer than the client's `timeout`, or it hangs.",
     if (!is.null(the_session$servers[[base]])) {
-      "`gym_server_stop()` ends a server of this session's; `gym_make()` then starts another."
+      "`gym_server_stop()` stops a server of this session; `gym_make()` then starts another."
     } else {
-      "`create_GymClient(timeout = )` waits longer; a server that hangs must be started anew."
+      "`create_GymClient(timeout = )` waits longer; restart a server that hangs."
     }
   )
 }
@@ -92,14 +92,14 @@ hanging_hint <- function(base) {
 connection_hint <- function(base, reason) {
   if (grepl("certificate|SSL peer", reason)) {
     return(paste(
-      "Its certificate is not one that this machine trusts.",
-      "`httr::set_config(httr::config(cainfo = \"FILE\"))` names one that is your own."
+      "This machine does not trust its certificate.",
+      "`httr::set_config(httr::config(cainfo = \"FILE\"))` adds your own."
     ))
   }
   if (!is.null(the_session$servers[[base]])) {
     return(paste(
-      "This session started it; `gym_server_log()` has its last words.",
-      "`gym_make()` starts another when it has ended."
+      "This session started it; see `gym_server_log()`.",
+      "If it has ended, `gym_make()` starts another."
     ))
   }
   place <- local_place(base)
@@ -113,7 +113,7 @@ connection_hint <- function(base, reason) {
 abort_no_answer <- function(response, call) {
   gym_abort(
     c(
-      "The answer is not what a Gym server sends.",
+      "The answer does not come from a Gym server.",
       x = paste0(response$url, " gave status ", response$status_code, " and ",
                  response$type %||% "content of no type", "."),
       i = foreign_server_hint(response$url, server_name(response))
@@ -140,12 +140,12 @@ proxy_statuses <- 502:504
 foreign_answer_message <- function(response) {
   if (response$status_code %in% proxy_statuses) {
     c("There is a proxy at this address, and the server behind it does not answer.",
-      i = "It may be starting anew. If that lasts, its operator should know.")
+      i = "It may be restarting. If this lasts, tell its operator.")
   } else if (response$status_code == 413L) {
-    c("The request is larger than the proxy at this address takes.",
+    c("The request exceeds the limit of the proxy at this address.",
       i = "Its operator sets that limit, in nginx `client_max_body_size`.")
   } else {
-    c("The answer is not what a Gym server sends.",
+    c("The answer does not come from a Gym server.",
       i = foreign_server_hint(response$url, server_name(response)))
   }
 }
@@ -158,14 +158,14 @@ foreign_answer_message <- function(response) {
 foreign_server_hint <- function(url, name) {
   if (grepl("^AirTunes", name %||% "")) {
     return(paste(
-      "That is AirPlay, to which macOS gives port 5000. `server <- gym_server_start()` takes a",
+      "That is AirPlay, which uses port 5000 on macOS. `server <- gym_server_start()` uses a",
       "free port; or switch \"AirPlay Receiver\" off in the System Settings (General, AirDrop &",
       "Handoff)."
     ))
   }
   called <- if (!is.null(name)) paste0("It calls itself \"", name, "\". ")
   free <- if (!is.null(local_place(base_of(url)))) {
-    " If another program has that port: `server <- gym_server_start()` takes a free one."
+    " If another program has that port, `server <- gym_server_start()` uses a free one."
   }
   paste0(called, "Is the address that of a Gym server?", free)
 }

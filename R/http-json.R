@@ -153,7 +153,7 @@ refuse_nul <- function(text) {
   # By bytes, because the text may not be UTF-8; the parser refuses that later.
   if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE, useBytes = TRUE)) {
     gym_abort(
-      "A text from the server has the character NUL, which no string in R can hold.",
+      "A text from the server has the character NUL, which R strings cannot contain.",
       class = "gym_error_space",
       call = NULL
     )
@@ -173,7 +173,7 @@ numbers_from_json <- function(elements) {
 number_from_json <- function(x) {
   if (is.character(x)) {
     if (!is_json_number(x)) {
-      abort_answer(paste(describe_value(x), "is no number"))
+      abort_answer(paste(describe_value(x), "is not a number"))
     }
     switch(x, "NaN" = NaN, "Infinity" = Inf, "-Infinity" = -Inf, as.numeric(x))
   } else {
@@ -192,7 +192,7 @@ whole_from_json <- function(json) {
   numbers <- unlist(json, use.names = FALSE)
   if (is.character(numbers)) {
     if (!all(grepl("^-?[0-9]+$", numbers))) {
-      abort_answer(paste(describe_value(numbers), "is no whole number"))
+      abort_answer(paste(describe_value(numbers), "is not a whole number"))
     }
     return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
   }

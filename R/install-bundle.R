@@ -112,8 +112,8 @@ copy_uv <- function(uv, new, call) {
   # The uv on the PATH may be a script that calls the real one.
   if (!file.copy(uv, copy) || !uv_works(copy)) {
     abort_bundle(
-      paste0("The uv in ", uv, " does not run from another folder, so no bundle can hold it."),
-      "`Sys.setenv(GYM_UV = )` names another one.", call
+      paste0("The uv in ", uv, " does not run from another folder; a bundle needs that."),
+      "Set another one by `Sys.setenv(GYM_UV = )`.", call
     )
   }
 }
@@ -138,7 +138,7 @@ replace_bundle <- function(new, dir, fields, call) {
   dir.create(dir, recursive = TRUE, showWarnings = FALSE)
   manifest <- file.path(dir, "bundle.dcf")
   tryCatch(suppressWarnings(write.dcf(list(Complete = "no"), manifest)), error = function(cnd) {
-    abort_bundle(paste0("The folder ", dir, " cannot be written."), "Name another one.", call)
+    abort_bundle(paste0("The folder ", dir, " cannot be written."), "Choose another one.", call)
   })
   unlink(file.path(dir, setdiff(bundle_parts(), "bundle.dcf")), recursive = TRUE)
   copy_bundle(new, dir, call)
@@ -161,7 +161,7 @@ copy_bundle <- function(from, to, call) {
     abort_bundle(
       paste0("The bundle in ", from, " could not be copied to ", to, ", and was not run: ",
              files[!right][[1L]], " is not what SHA256SUMS lists."),
-      paste("It was damaged or changed on the way: copy the bundle again, or make it anew.",
+      paste("It was damaged or changed: copy the bundle again, or make a new one.",
             "Or the disk is full: make room."),
       call
     )
@@ -221,7 +221,7 @@ check_bundle <- function(fields, lacking, extras, call) {
   if (fields[["Lock"]] != lock_hash()) {
     abort_bundle(
       "The bundle was made by another version of this package, which needs other packages.",
-      "Install the same version of the package on both machines, and make the bundle anew.", call
+      "Install the same version of the package on both machines, and make a new bundle.", call
     )
   }
   if (length(lacking)) {

@@ -90,8 +90,8 @@ make_venv <- function(folder, source, call) {
         paste("No environment could be made with the Python that UV_PYTHON names,",
               source$named_python),
         output, call, more = paste(
-          "It must be a 64-bit Python 3.10 to 3.13; `Sys.unsetenv(\"UV_PYTHON\")` has uv install",
-          "one."
+          "It must be a 64-bit Python 3.10 to 3.13; after `Sys.unsetenv(\"UV_PYTHON\")`",
+          "uv installs one."
         )
       )
     }
@@ -106,7 +106,7 @@ make_venv <- function(folder, source, call) {
   if (failed(other)) {
     abort_tool(
       paste0("uv could not install Python ", source$python,
-             ", and found none on this machine that serves as well (", source$other_python, ")"),
+             ", and found no suitable one on this machine (", source$other_python, ")"),
       output, call,
       more = paste(
         "Install one of these and call `gym_server_install()` again; or set",
@@ -115,7 +115,7 @@ make_venv <- function(folder, source, call) {
     )
   }
   cli::cli_inform(c(
-    i = "uv could not install a Python of its own; one of this machine's serves as well.",
+    i = "uv could not install its own Python and uses one on this machine.",
     " " = grep("^Using ", other, value = TRUE)[1L],
     " " = "The reason is in {.path {install_log()}}."
   ))

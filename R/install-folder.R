@@ -31,8 +31,8 @@ make_folder <- function(folder, call) {
     abort_install(
       c(
         paste0("The folder ", folder, " cannot be made."),
-        i = "It must be possible to write there, and the disk must have room.",
-        i = "The environment variable R_USER_CACHE_DIR names another place for it."
+        i = "Check that you can write there and that the disk is not full.",
+        i = "The environment variable R_USER_CACHE_DIR sets another place for it."
       ),
       call = call
     )
@@ -80,7 +80,7 @@ write_extras <- function(folder, extras, call) {
   if (!identical(read_extras(folder), extras)) {
     abort_install(
       c(paste0("The file ", path, " cannot be written."),
-        i = "Is the disk full? `gym_server_install()` goes on from here."),
+        i = "Is the disk full? `gym_server_install()` continues from here."),
       call = call
     )
   }

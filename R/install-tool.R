@@ -63,7 +63,7 @@ abort_tool <- function(what, output, call, more = NULL) {
       x = if (length(lines)) paste(lines, collapse = "\n"),
       rlang::set_names(c(install_advice(output), more), "i"),
       i = paste0("The full output is in ", install_log(), "."),
-      i = "What was installed before is still there; `gym_server_install()` goes on from here."
+      i = "The finished part is kept; `gym_server_install()` continues from here."
     ),
     output = output,
     call = call
@@ -98,14 +98,14 @@ failures <- list(
       "no space left|os error (28|112|122)\\b|errno (28|122)\\b|not enough space|quota exceeded"
     ),
     advice = c(
-      "The disk is full. The package needs room in its cache folder and in the temporary one.",
-      "The environment variable R_USER_CACHE_DIR names another place, TMPDIR and UV_CACHE_DIR too."
+      "The disk is full. The package needs space in its cache folder and in the temporary one.",
+      "The variables R_USER_CACHE_DIR, TMPDIR and UV_CACHE_DIR set other folders."
     )
   ),
   list(
     words = "hash(es)? mismatch|mismatched hash",
     advice = c(
-      "A file that came is not the one that the package was made for, and was refused.",
+      "A downloaded file has the wrong hash and was refused.",
       "A proxy or mirror may have changed it; try again, or in another network."
     )
   ),
@@ -131,7 +131,7 @@ failures <- list(
     words = "permission denied|os error (5|13)\\b|access is denied|winerror 5\\b",
     advice = c(
       "A file or folder cannot be written; a virus scanner may hold it, or another user own it.",
-      "The environment variable R_USER_CACHE_DIR names another place for the cache folder."
+      "The environment variable R_USER_CACHE_DIR sets another cache folder."
     )
   ),
   list(
@@ -140,7 +140,7 @@ failures <- list(
       "connect error|connect to|error sending request|failed to (fetch|download)|forbidden"
     ),
     advice = c(
-      "The network was not reached, or does not let these files through.",
+      "The network is unavailable or blocks these files.",
       "Behind a proxy set HTTPS_PROXY to its address, such as \"http://proxy.example:8080\".",
       paste("Without a network, `gym_server_install(offline = )` installs from a folder that",
             "`gym_server_bundle()` filled on another machine.")

@@ -22,9 +22,9 @@ find_uv <- function(call = rlang::caller_env(), within = NULL) {
   if (!uv_works(uv, within %||% 30)) {
     abort_install(
       c(
-        paste0("The variable GYM_UV names ", named, ", which is no uv that can be used."),
+        paste0("The variable GYM_UV names ", named, ", which is not a usable uv."),
         i = paste0("It must be the path of uv ", least_uv, " or newer."),
-        i = "`Sys.unsetenv(\"GYM_UV\")` has another looked for."
+        i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for."
       ),
       call = call
     )
@@ -124,7 +124,7 @@ without_uv <- function() {
     "Without uv, install the packages into a Python 3.10 to 3.13 by other means, in a terminal",
     "for example by", paste0("`python -m pip install ",
                              quote_for_terminal(system.file("server", package = "gym")), "`,"),
-    "and have GYM_PYTHON name that Python."
+    "and set GYM_PYTHON to that Python."
   )
 }
 
@@ -149,7 +149,7 @@ download_uv <- function(url, archive, call) {
   keep <- function(bytes) {
     received <<- received + length(bytes)
     if (received > most_bytes_of_uv) {
-      stop("What is there is larger than ", most_bytes_of_uv / 1e6, " MB.", call. = FALSE)
+      stop("The file is larger than ", most_bytes_of_uv / 1e6, " MB.", call. = FALSE)
     }
     writeBin(bytes, file)
   }
@@ -162,7 +162,7 @@ download_uv <- function(url, archive, call) {
         paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
         more = c(
           paste("uv can also be installed by hand (<https://docs.astral.sh/uv/>):",
-                "`gym_server_install()` takes the one that it finds."),
+                "`gym_server_install()` then finds it."),
           without_uv()
         )
       )
@@ -182,9 +182,9 @@ check_uv_archive <- function(archive, expected, call) {
   if (!identical(found, expected)) {
     abort_install(
       c(
-        "The uv that was downloaded is not the one that was published, and was thrown away.",
+        "The downloaded uv is not the published one and was deleted.",
         x = paste0("Its SHA-256 is ", found, " and should be ", expected, "."),
-        i = paste("A proxy may have put a page of its own in its place, or the download broke off:",
+        i = paste("A proxy may have replaced it, or the download broke off:",
                   "try again, or in another network.")
       ),
       call = call
@@ -212,7 +212,7 @@ unpack_uv <- function(archive, call) {
   if (!works || !file.exists(pinned_uv())) {
     abort_install(
       c(
-        paste("The uv that was downloaded cannot be run from", dirname(pinned_uv())),
+        paste("The downloaded uv cannot be run from", dirname(pinned_uv())),
         i = "Is the disk full, or are programs not allowed to run from there?",
         i = without_uv()
       ),

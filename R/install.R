@@ -67,7 +67,7 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
 
 with_interrupt_message <- function(code) {
   withCallingHandlers(code, interrupt = function(cnd) {
-    cli::cli_inform(c("!" = "Interrupted: {.code gym_server_install()} goes on from there."))
+    cli::cli_inform(c("!" = "Interrupted: {.code gym_server_install()} continues from here."))
   })
 }
 
@@ -91,7 +91,7 @@ check_named_python <- function(call) {
   abort_install(
     c(
       paste0("The variable GYM_PYTHON names ", named, ", ", what, "."),
-      i = "The server needs 64-bit Python 3.10 to 3.13, and the Python named there comes first.",
+      i = "The server needs 64-bit Python 3.10 to 3.13, and that Python is used first.",
       i = paste("`Sys.unsetenv(\"GYM_PYTHON\")`, and the same in ~/.Renviron; then",
                 "`gym_server_install()` again.")
     ),
@@ -130,8 +130,8 @@ inform_of_precedence <- function(python) {
   named <- Sys.getenv("GYM_PYTHON")
   if (nzchar(named) && !identical(path.expand(named), python)) {
     cli::cli_inform(c(
-      "!" = "The variable GYM_PYTHON is set, and the Python that it names comes first.",
-      " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} has this session use what was installed."
+      "!" = "The variable GYM_PYTHON is set, and its Python is used first.",
+      " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} makes this session use the installed one."
     ))
   }
 }

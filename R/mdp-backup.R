@@ -67,7 +67,7 @@ most_cells <- 1e8
 check_fits_memory <- function(cells, what, call, arg = "model", hint = NULL) {
   if (cells > most_cells) {
     gym_abort(
-      c(paste0(what, " takes tables of ", whole_number_text(cells), " numbers, and at most ",
+      c(paste0(what, " needs tables of ", whole_number_text(cells), " numbers; at most ",
                whole_number_text(most_cells), " are possible."),
         i = hint),
       class = "gym_error_argument", argument = arg, value = cells, call = call

@@ -81,14 +81,14 @@ compare_starts <- function(check, model, starts) {
   unseen <- which(!seen & (1 - model$start)^length(starts) < too_rare)
   if (length(unknown)) {
     note_finding(check, "model", paste0(
-      "An episode started in state ", unknown[[1L]], " in play, and the model gives that the ",
-      "probability 0."
+      "An episode started in state ", unknown[[1L]], " in play, which has the ",
+      "probability 0 in the model."
     ))
   } else if (length(unseen)) {
     state <- unseen[[1L]]
     note_finding(check, "model", paste0(
       "No episode started in state ", states[[state]], " in ",
-      count_of(length(starts), "episode"), " of play, for which the model has the probability ",
+      count_of(length(starts), "episode"), " of play; its probability in the model is ",
       number_text(model$start[[state]]), "."
     ))
   }
@@ -104,13 +104,13 @@ compare_steps <- function(check, model, steps) {
                 one$next_state, " in play")
   note_finding(check, "model", switch(
     one$unlike,
-    next_state = paste0(led, ", and the model gives that the probability 0."),
+    next_state = paste0(led, ", which has the probability 0 in the model."),
     terminated = paste0(
       led,
       if (one$terminated) {
-        " and ended the episode, which by the model goes on."
+        " and ended the episode, which goes on in the model."
       } else {
-        " and the episode went on, which by the model ends there."
+        " and the episode went on, which ends there in the model."
       }
     ),
     reward = {
@@ -161,7 +161,7 @@ look_for_unseen <- function(check, steps, table) {
       if (there) {
         paste0(" for the reward ", number_text(one$reward), if (one$terminated) " and the end")
       },
-      " in play, for which the model has the probability ",
+      " in play; the probability in the model is ",
       number_text(probability[[row]]), "."
     ))
   }

@@ -115,15 +115,15 @@ starts_of <- function(env, model, call) {
   if (length(stuck)) {
     gym_abort(
       paste0("`reset()` of ", environment_label(env), " starts in state ", stuck[[1L]],
-             ", but no row of the model leaves that."),
+             ", but no row of the model leaves that state."),
       class = "gym_error_argument", argument = "model", value = model, call = call
     )
   }
   count <- length(unique(seen))
   if (count > 1L) {
     cli::cli_inform(
-      c(i = "{count} states start episodes of the model, as often as {length(seen)} resets did.",
-        " " = "`gym_model(start = )` names their probabilities."),
+      c(i = "{length(seen)} resets started in {count} states and estimate their probabilities.",
+        " " = "Set the probabilities by `gym_model(start = )`."),
       class = "gym_message_model"
     )
   }

@@ -35,14 +35,14 @@ estimate_model.gym_rollout <- function(x, ...) {
   after <- grep("^next_", names(steps), value = TRUE)
   if (!is.data.frame(steps) || !length(after)) {
     gym_abort(
-      c("The rollout does not have what is needed of its steps.",
+      c("The rollout lacks the steps, or the next observations.",
         i = "Play it with `rollout(steps = TRUE, next_observation = TRUE)`."),
       class = "gym_error_argument", argument = "x", value = x
     )
   }
   if (length(after) != 1L || !is.integer(steps[[after]]) || !is.integer(steps$action)) {
     gym_abort(
-      paste0("A model has numbered states and actions, and those of ", x$env_id,
+      paste0("A model has numbered states and actions, but those of ", x$env_id,
              " are not Discrete."),
       class = "gym_error_argument", argument = "x", value = x
     )

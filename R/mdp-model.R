@@ -155,7 +155,7 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
 
 check_is_model <- function(model, call = rlang::caller_env()) {
   if (!inherits(model, "gym_model")) {
-    abort_argument(model, "a model, as `gym_model()` makes it", "model", call)
+    abort_argument(model, "a model made by `gym_model()`", "model", call)
   }
 }
 
@@ -193,7 +193,7 @@ check_probabilities <- function(table, call) {
       c(paste0("The probabilities of action ", at[[2L]], " in state ", at[[1L]], " add up to ",
                format(sums[[wrong[[1L]]]], digits = 10), ", not to 1."),
         i = if (length(wrong) > 1L) {
-          paste0("So it is with ", count_of(length(wrong) - 1, "further pair"),
+          paste0("The same holds for ", count_of(length(wrong) - 1, "further pair"),
                  " of a state and an action.")
         }),
       class = "gym_error_argument", argument = "transitions", call = call

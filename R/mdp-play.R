@@ -143,8 +143,8 @@ check_possible <- function(moves, model, row, action, pair, over) {
     gym_abort(
       c(paste0("Action ", action[barred][[1L]], " cannot be taken in state ",
                moves$states[[at]], " of ", model$spec$id, "."),
-        i = paste0("What can be taken there: ", toString(has),
-                   ". A `policy_table()` has -Inf for the others.")),
+        i = paste0("Valid actions there: ", toString(has),
+                   ". Use -Inf for the others in a `policy_table()`.")),
       class = "gym_error_argument", argument = "action", value = action, call = NULL
     )
   }

@@ -24,7 +24,7 @@ policy_matrix <- function(policy, model, call) {
     gym_abort(
       paste0("The policy takes action ", state_numbers(model$action_space)[[at[[2L]]]],
              " in state ", state_numbers(model$observation_space)[[at[[1L]]]],
-             ", where the model does not have it."),
+             ", where the model does not have that action."),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
   }
@@ -84,7 +84,7 @@ policy_probabilities.default <- function(policy, model, call) {
   actions[possible] <- ask(1)
   if (!identical(ask(2), actions[possible])) {
     gym_abort(
-      c("The policy draws its actions, so what it comes to cannot be calculated.",
+      c("The policy draws its actions, so its value cannot be calculated.",
         i = paste("Give the probabilities, a matrix with a row for each state and a column for",
                   "each action, or play it: `rollout()`.")),
       class = c("gym_error_draws", "gym_error_argument"), argument = "policy", value = policy,

@@ -118,8 +118,8 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
 
 abort_no_end <- function(model, call) {
   gym_abort(
-    c(paste0("Episodes of ", model$spec$id, " have no end, whatever is done, and without a ",
-             "discount their values have none either."),
+    c(paste0("Episodes of ", model$spec$id, " never end, and without a ",
+             "discount their values are infinite."),
       i = "Give a `discount` below 1, or a `horizon`."),
     class = "gym_error_argument", argument = "discount", value = 1, call = call
   )
@@ -245,7 +245,7 @@ as.data.frame.gym_solution <- function(x, row.names = NULL, optional = FALSE, ..
 predict.gym_solution <- function(object, newdata, ...) {
   if (is.null(object$policy)) {
     gym_abort(
-      c("The policy of a solution with a horizon counts steps, and acts by more than the state.",
+      c("The policy of a solution with a horizon depends on the step, not only on the state.",
         i = "Its element `actions` has an action for each state and step."),
       class = "gym_error_argument", argument = "object", value = object
     )

@@ -71,7 +71,7 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
 check_has_end <- function(vector_env, max_steps) {
   if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
     gym_abort(
-      c(paste0("Episodes of ", environment_label(vector_env), " have no end, whatever is done."),
+      c(paste0("Episodes of ", environment_label(vector_env), " never end."),
         i = "Give `max_steps`, after which an episode is cut off."),
       class = "gym_error_argument", argument = "max_steps", call = vector_env$call
     )

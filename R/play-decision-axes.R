@@ -6,8 +6,8 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   space <- place$observation_space
   if (!is.null(space) && !inherits(space, "gym_space_box")) {
     gym_abort(
-      c(paste0("A decision map shows two numbers of an observation, but what is observed ",
-               if (!is.null(place$env_id)) paste0("in ", place$env_id, " "), "is of ",
+      c(paste0("A decision map shows two numbers of an observation, but observations ",
+               if (!is.null(place$env_id)) paste0("in ", place$env_id, " "), "are of ",
                format(space), "."),
         i = "`act(policy, )` gives the action for each single observation."),
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
@@ -126,7 +126,7 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
     range(along) + c(-0.05, 0.05) * diff(range(along))
   } else {
     gym_abort(
-      c(paste0("What range of ", name, " to show is unknown, as it has no bounds."),
+      c(paste0("The range of ", name, " is unknown, because it has no bounds."),
         i = paste0("Give it as `", arg, "`, or a `path` through it.")),
       class = "gym_error_argument", argument = arg, call = call
     )

@@ -149,7 +149,7 @@ is_counted_parts <- function(space) {
 check_mappable <- function(policy, call = rlang::caller_env()) {
   if (inherits(policy, "gym_policy_random")) {
     gym_abort(
-      "There is nothing to map: a random policy draws its actions, whatever it observes.",
+      "There is nothing to map: a random policy ignores the observation.",
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
   }
@@ -180,9 +180,9 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
   if (!inherits(policy, "gym_policy_network") && !played) {
     gym_abort(
-      c(paste0("What is observed and done is known of networks and models that were played, ",
-               "not of ", policy_text(policy), "."),
-        i = "Name the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y = )`."),
+      c(paste0("Without `env` a decision map needs a network, or a model that was played, ",
+               "not ", policy_text(policy), "."),
+        i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y = )`."),
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }

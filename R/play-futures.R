@@ -124,8 +124,8 @@ launch_tasks <- function(crew) {
       crew$broken <- TRUE
       the_session$broken_plan <- plan_workers()
       warn_of_workers(paste0(
-        "The plan takes no more futures (", first_message_line(one$future),
-        "): the session plays on by itself."
+        "The plan accepts no more futures (", first_message_line(one$future),
+        "): the session continues alone."
       ), "Set `future::plan(\"sequential\")` and then your plan again, to go on with workers.")
       crew$again <- c(list(one), crew$again)
     } else {

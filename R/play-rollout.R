@@ -225,7 +225,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
         report = function(ended) show(history$played_episodes + ended),
         max_steps = max_steps %||% Inf, keep_steps = !isFALSE(steps), keep_next = next_observation
       ),
-      "Interrupted after {finished} of {total} episode{?s}; what was finished is returned.",
+      "Interrupted after {finished} of {total} episode{?s}; the finished ones are returned.",
       function() history$played_episodes, total
     ),
     error = function(cnd) {

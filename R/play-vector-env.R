@@ -185,7 +185,7 @@ abort_with_result <- function(cnd, what, result, played, class, call, hint = NUL
     gym_abort,
     c(
       paste0(what, " ended early, after ", played, "."),
-      i = "What was played is the element `result` of this condition.",
+      i = "The field `result` of this condition has the finished part.",
       i = hint
     ),
     class = c(class, grep("^gym_error_", class(cnd), value = TRUE)),

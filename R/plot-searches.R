@@ -56,7 +56,7 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
 check_has_chance <- function(x, call = rlang::caller_env()) {
   if (!isTRUE(x$chance > 0)) {
     gym_abort(
-      c("There is nothing to plot: no search was solved, so that the chance of a round is unknown.",
+      c("There is nothing to plot: no search was solved, so the chance of a round is unknown.",
         i = "More `rounds` or more `seeds` may help, or a lower `target`."),
       class = "gym_error_argument", argument = "x", value = x, call = call
     )

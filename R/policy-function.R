@@ -26,7 +26,7 @@ ask_about_one <- function(policy, one, vector_env) {
     gym_error = function(cnd) rlang::cnd_signal(cnd),
     error = function(cnd) {
       gym_abort(
-        c("The policy failed when it was asked about one observation, before the first step.",
+        c("The policy failed for a single observation, before the first step.",
           i = observations_hint(vector_env$observation_space),
           i = paste("There may be only one, as when all episodes but one have ended;",
                     "`drop = FALSE` keeps one row of a matrix a matrix.")),

@@ -167,7 +167,7 @@ act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
   kept <- policy$kept
   if (is.null(kept)) {
     gym_abort(
-      c("The policy has a memory, so what it does does not follow from an observation alone.",
+      c("The policy has a memory, so its actions do not depend on the observation alone.",
         i = "`rollout()` plays it, and `act(policy, observation, memory)` asks it by hand."),
       class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
     )

@@ -238,7 +238,7 @@ predict_policy.gym_policy_model <- function(policy, newdata, type, call = rlang:
 check_was_played <- function(policy, call) {
   if (is.null(policy$action_space)) {
     gym_abort(
-      c("The model does not know what is observed, nor what actions there are.",
+      c("The model does not know the observations and actions of an environment.",
         i = "Play it with `rollout()`: the policy in what that returns knows the environment."),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )

@@ -46,8 +46,8 @@ act.gym_policy_random <- function(policy, observation, ...) {
   if (is.null(space)) {
     gym_abort(
       c(
-        "The random policy does not know what actions there are.",
-        i = "Name them, as in `policy_random(env$action_space)`, or play it with `rollout()`."
+        "The random policy has no action space.",
+        i = "Give one, as in `policy_random(env$action_space)`, or play it with `rollout()`."
       ),
       class = "gym_error_argument",
       argument = "policy",

@@ -78,7 +78,7 @@ check_layer <- function(layer, wanted, bias, arg, call) {
         paste0("`", arg, "` must be a matrix of ", paste(wanted, collapse = " x "),
                " for these sizes", if (isTRUE(bias)) " and a bias", ", not of ",
                paste(dim(layer), collapse = " x "), "."),
-        i = if (turned) "`t()` turns it: a row is a neuron, a column one of what it takes."
+        i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
       ),
       class = "gym_error_argument", argument = arg, value = layer, call = call
     )

@@ -49,7 +49,7 @@ port_holder <- function(base) {
   } else if (holder$is_gym) {
     paste0("A Gym server has it: ", use, ".")
   } else if (is.null(holder$name)) {
-    "Another program has it. `gym_server_start()` without a port takes a free one."
+    "Another program has it. `gym_server_start()` without a port uses a free one."
   } else {
     foreign_server_hint(base, holder$name)
   }

@@ -37,7 +37,7 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   if (length(own)) {
     in_r <- sub("--port 0 picks", "`gym_server_start()` without a port picks", own, fixed = TRUE)
     abort_server_start(
-      "The server ended before it took connections.", in_r, call, port_hint(own[[1L]])
+      "The server ended before it accepted connections.", in_r, call, port_hint(own[[1L]])
     )
   }
   refusal_reason(lines)
@@ -56,7 +56,7 @@ not_started_reason <- function(python) {
 refusal_reason <- function(lines) {
   lines <- lines[nzchar(lines)]
   if (!length(lines)) {
-    return("it ended without a word")
+    return("it ended without output")
   }
   sub("^gym_server cannot run on this Python [(].*[)]: ", "", utils::tail(lines, 1L))
 }

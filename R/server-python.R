@@ -24,7 +24,7 @@ no_python_message <- function(refusals) {
     return(c(
       "The Python that was installed for the server cannot run it.",
       x = paste0(names(own), ": ", own),
-      i = "`gym::gym_server_install()` installs it anew."
+      i = "`gym::gym_server_install()` installs it again."
     ))
   }
   c(

@@ -52,7 +52,7 @@ finding <- function(topic, what, finding, state = "ok", fix = NA_character_) {
 # Users of gym_sitrep() already have a problem, so an error here becomes a finding.
 attempt_rows <- function(topic, what, rows) {
   tryCatch(rows, error = function(cnd) {
-    finding(topic, what, paste("could not be found out:", conditionMessage(cnd)), "wrong")
+    finding(topic, what, paste("could not be determined:", conditionMessage(cnd)), "wrong")
   })
 }
 

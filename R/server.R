@@ -71,7 +71,7 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
   client <- start_server(port, python, options, timeout, token)
   if (missing(token) && is.null(client$token) && !isTRUE(options$no_auth)) {
     cli::cli_inform(
-      c(i = paste("The server at {client$remote_base} asks for no token: any account of this",
+      c(i = paste("The server at {client$remote_base} requires no token: any account of this",
                   "machine can use it.")),
       class = "gym_message_open_server"
     )
@@ -85,8 +85,8 @@ check_own_token <- function(token, call = rlang::caller_env()) {
     gym_abort(
       c(
         "`token` must be `TRUE` or `FALSE`.",
-        i = paste0("`token_file = ` names a file that holds a token of yours, and the environment ",
-                   "variable ", token_variable, " may hold it.")
+        i = paste0("Set your own token in a file, by `token_file = `, or in the environment ",
+                   "variable ", token_variable, ".")
       ),
       class = "gym_error_argument", argument = "token", call = call
     )

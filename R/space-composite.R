@@ -93,7 +93,7 @@ key_problem <- function(keys, given) {
   if (length(missing)) {
     paste0("The value has no element named \"", missing[[1L]], "\"")
   } else if (length(strange)) {
-    paste0("The value has an element named \"", strange[[1L]], "\", which the space has not")
+    paste0("The value has an element named \"", strange[[1L]], "\", which the space does not have")
   } else if (anyDuplicated(given)) {
     paste0("The value has two elements named \"", given[anyDuplicated(given)], "\"")
   }

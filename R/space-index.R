@@ -155,9 +155,9 @@ table_index <- function(space, what, call) {
   index <- space_index(space)
   if (is.null(index)) {
     gym_abort(
-      c(paste0("A table needs ", what, " that can be counted, and ", format(space), " cannot."),
+      c(paste0("A table needs ", what, " that can be counted, but ", format(space), " cannot."),
         i = paste("Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these."),
-        i = "For observations in a Box there are networks and features."),
+        i = "For observations in a Box use a network or features."),
       class = "gym_error_argument", value = space, call = call
     )
   }
@@ -167,7 +167,7 @@ table_index <- function(space, what, call) {
                whole_number_text(index$count),
                " rows; at most ", whole_number_text(most_values),
                " are possible."),
-        i = "With `features`, as `tile_coding()` makes them, observations share a value."),
+        i = "With `features`, such as `tile_coding()`, observations share a value."),
       class = "gym_error_argument", value = space, call = call
     )
   }

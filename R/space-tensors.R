@@ -147,7 +147,8 @@ check_dtype <- function(space, flat, value, call, path = "") {
   }
   if (any(lost)) {
     at <- path_index(path, unravel(which(lost)[[1L]], space$shape))
-    abort_space(space, value, paste("There is a number that no", space$dtype, "holds"), call, at)
+    problem <- paste("There is a number that", space$dtype, "cannot represent")
+    abort_space(space, value, problem, call, at)
   }
 }
 

@@ -25,7 +25,7 @@ check_value.gym_space_text <- function(space, value, path, call, bounds = FALSE)
     }
     strange <- setdiff(characters, known)
     if (length(strange)) {
-      problem <- paste("The text has characters that the space does not know:", toString(strange))
+      problem <- paste("The text has characters that the space does not allow:", toString(strange))
       abort_space(space, value, problem, call, path)
     }
   }

@@ -29,7 +29,7 @@ space_sample.gym_space_undescribed <- function(space) abort_undescribed(space)
 
 abort_undescribed <- function(space, call = rlang::caller_env()) {
   gym_abort(
-    paste0("The server tells no more of this space than its name, ", space$name, "."),
+    paste0("The server gives only the name of this space, ", space$name, "."),
     class = "gym_error_argument", argument = "space", value = space, call = call
   )
 }

@@ -347,8 +347,8 @@ check_training_ends <- function(vector_env, settings, online, call) {
   state <- state_without_end(model)
   if (!is.null(state)) {
     gym_abort(
-      c(paste0("An episode of ", environment_label(vector_env), " that comes to state ", state,
-               " has no end, whatever is done."),
+      c(paste0("An episode of ", environment_label(vector_env), " that reaches state ", state,
+               " never ends."),
         i = "Give `max_steps`, after which an episode is cut off, or let the model end there."),
       class = "gym_error_argument", argument = "max_steps", call = call
     )
@@ -405,8 +405,8 @@ check_training <- function(settings, call) {
 check_no_steps <- function(names, call) {
   if ("steps" %in% names) {
     gym_abort(
-      c("`steps` is called `total_steps`: the budget of a training, in steps of the environment.",
-        i = "An environment with an argument of this name can be made by `gym_make()`."),
+      c("The budget in steps of the environment is the argument `total_steps`, not `steps`.",
+        i = "For an environment with an argument `steps`, call `gym_make()` first."),
       class = "gym_error_argument", argument = "steps", call = call
     )
   }
@@ -436,7 +436,7 @@ abort_no_budget <- function(hints = NULL, call) {
 check_trained_policy <- function(policy, agent, call) {
   if (learns_online(agent)) {
     if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
-      must <- "NULL, or a table of values to begin with, as `policy_table()` makes it"
+      must <- "NULL, or a table of values made by `policy_table()`"
       abort_argument(policy, must, "policy", call)
     }
   } else if (!inherits(policy, "gym_policy_network")) {
@@ -455,7 +455,7 @@ check_agent <- function(agent, call) {
   }
   if (!inherits(agent, "gym_agent")) {
     gym_abort(
-      c(paste0("`agent` must be an agent, as `agent_ars()` makes it, not ",
+      c(paste0("`agent` must be an agent made by a function such as `agent_ars()`, not ",
                describe_argument(agent), "."),
         i = if (is.character(agent)) {
           paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",

@@ -20,11 +20,11 @@ read_checkpoint <- function(path, call) {
   if (!identical(file$format, checkpoint_format)) {
     which <- if (isTRUE(file$format < checkpoint_format)) "an older" else "another"
     problem <- paste0("was written by ", which, " version of this package (", file$version,
-                      ", format ", file$format, "), which this one does not read")
+                      ", format ", file$format, "), which this version cannot read")
     abort_checkpoint(path, problem, call = call)
   }
   if (!is.raw(file$state) || !identical(rlang::hash(file$state), file$hash)) {
-    abort_checkpoint(path, "is damaged", "Its content is not what was written.", call)
+    abort_checkpoint(path, "is damaged", "Its content does not match its hash.", call)
   }
   unserialize(file$state)
 }
@@ -162,21 +162,22 @@ overtaken_by <- function(path, own, what) {
   } else if (!is_same(there$what, own$what) || !is_same(there$arguments, own$arguments)) {
     paste("is now that of another", what)
   } else if (there$training$steps > own$training$steps) {
-    paste("is that of the same", what, "in another process, which is further")
+    paste("is that of the same", what, "in another process, which is ahead")
   }
 }
 
 warn_overtaken <- function(path, whose) {
   rlang::warn(
     c(paste0("The checkpoint \"", path, "\" ", whose, ", and is left as it is."),
-      i = "Give each of them a file of its own as `checkpoint`."),
+      i = "Give each of them its own `checkpoint` file."),
     class = "gym_warning_checkpoint"
   )
 }
 
 warn_not_written <- function(path, what, cnd) {
   rlang::warn(
-    c(paste0("The checkpoint \"", path, "\" cannot be written; the ", what, " goes on without."),
+    c(paste0("The checkpoint \"", path, "\" cannot be written; the ", what,
+             " continues without it."),
       x = conditionMessage(cnd)),
     class = "gym_warning_checkpoint"
   )

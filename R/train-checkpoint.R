@@ -98,7 +98,7 @@ finished_training <- function(run, client) {
   }
   inform_resumed(paste(
     "This", settings$what, "had ended: {.path {run$file$path}} has its result.",
-    "{.code resume = FALSE} plays it anew."
+    "{.code resume = FALSE} plays it again."
   ))
   training_result(settings, state)
 }
@@ -204,7 +204,7 @@ check_same_server <- function(path, there, now, call) {
       paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
              describe_value(now[[name]]), " on this server.")
     }, "")
-    abort_checkpoint(path, "is from a server that played otherwise", lines, call)
+    abort_checkpoint(path, "is from a server with other settings", lines, call)
   }
 }
 
@@ -214,8 +214,8 @@ abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
       paste0("The checkpoint \"", path, "\" ", problem, "."),
       if (length(lines)) stats::setNames(lines, rep("x", length(lines))),
       i = paste(
-        "Give another file as `checkpoint`; `resume = FALSE` begins anew and replaces what is",
-        "there."
+        "Give another file as `checkpoint`, or start again with `resume = FALSE`, which",
+        "replaces the file."
       )
     ),
     class = c("gym_error_checkpoint", "gym_error_argument"),

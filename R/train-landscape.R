@@ -64,7 +64,7 @@ search_landscape <- function(search, size = 21, span = 1, episodes = 5, seed = N
                              progress = rlang::is_interactive(),
                              client = search$client %||% gym_client()) {
   if (!inherits(search, "gym_search")) {
-    abort_argument(search, "a search, as `search_random()` returns it", "search",
+    abort_argument(search, "a search made by `search_random()`", "search",
                    rlang::current_env())
   }
   check_found(search)

@@ -212,7 +212,7 @@ check_rewards <- function(reward, call) {
   if (!all(is.finite(reward))) {
     gym_abort(
       paste0("A reward of the environment is ", reward[!is.finite(reward)][[1L]],
-             ", and not a finite number."),
+             ", not a finite number."),
       class = "gym_error_agent", call = call
     )
   }
@@ -285,7 +285,7 @@ model_to_sample <- function(settings, call) {
   id <- model$spec$id
   if (is.null(settings$max_steps) && is.null(model$spec$max_episode_steps)) {
     gym_abort(
-      c(paste0(id, " has no limit of steps, so that an episode may never end."),
+      c(paste0(id, " has no step limit, so an episode may never end."),
         i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."),
       class = "gym_error_argument", argument = "max_steps", call = call
     )

@@ -117,7 +117,7 @@ abort_log <- function(folder, cnd, call) {
 
 warn_not_logged <- function(table, cnd) {
   rlang::warn(
-    c(paste0("The log \"", table, "\" cannot be written; the training goes on without."),
+    c(paste0("The log \"", table, "\" cannot be written; the training continues without it."),
       x = conditionMessage(cnd)),
     class = "gym_warning_log"
   )

@@ -48,7 +48,8 @@ run_training <- function(state, vector_env, settings, progress, call) {
   what <- settings$what
   interrupted <- tryCatch(
     until_interrupted(
-      play(), paste("The", what, "was interrupted after {finished}; it returns what it has."),
+      play(),
+      paste("The", what, "was interrupted after {finished}; the finished part is returned."),
       function() played_text(settings, state)
     ),
     error = function(cnd) {
@@ -56,7 +57,7 @@ run_training <- function(state, vector_env, settings, progress, call) {
         cnd, paste("The", what), training_result(settings, state), played_text(settings, state),
         unique(paste0("gym_error_", c(what, "training"))), call,
         if (!is.null(state$path)) {
-          paste0("The same call goes on from \"", state$path, "\" when what is wrong is fixed.")
+          paste0("After a fix, the same call resumes from \"", state$path, "\".")
         }
       )
     }
@@ -250,7 +251,7 @@ candidate_results <- function(history, asked, call) {
     wrong <- which(!is.finite(returns))[[1L]]
     gym_abort(
       paste0("The mean return of candidate ", wrong, " of ", length(returns), " is ",
-             returns[[wrong]], ": a reward of the environment was no finite number."),
+             returns[[wrong]], ": a reward of the environment was not a finite number."),
       class = "gym_error_agent", candidate = wrong,
       weights = if (!is.null(asked)) asked[wrong, ], call = call
     )

@@ -12,8 +12,8 @@ with_masks <- function(vector_env, name, note, call) {
   if (vector_env$one_seed || !"return_info" %in% names(formals(env$reset))) {
     gym_abort(
       c(paste0("`mask` needs the infos of ", environment_label(vector_env),
-               ", which cannot be had as it is played here."),
-        i = paste("A single environment gives them, and one that `gym_make()` makes with",
+               ", which are not available in this vector environment."),
+        i = paste("Use a single environment, or one made by `gym_make()` with",
                   "vectorization_mode \"sync\".")),
       class = "gym_error_argument", argument = "mask", value = name, call = call
     )

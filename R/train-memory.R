@@ -145,7 +145,7 @@ read_memory <- function(file, count, width, call) {
   if (!file.exists(file) || file.size(file) < bytes) {
     gym_abort(
       c(paste0("The memory that belongs to the checkpoint, \"", file, "\", is missing or damaged."),
-        i = "`resume = FALSE` begins anew."),
+        i = "`resume = FALSE` starts again."),
       class = c("gym_error_checkpoint", "gym_error_argument"), path = file, call = call
     )
   }

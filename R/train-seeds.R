@@ -55,7 +55,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   interrupted <- keeping_trainings(
     until_interrupted(
       in_env(train_all, settings$max_steps),
-      "Interrupted after {finished} of {total} seed{?s}; what was finished is returned.",
+      "Interrupted after {finished} of {total} seed{?s}; the finished ones are returned.",
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
@@ -68,9 +68,9 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
 check_has_target <- function(settings, vector_env, call) {
   if (is.null(training_target(settings, vector_env$spec))) {
     gym_abort(
-      c(paste(environment_label(vector_env), "has no reward threshold, so that nothing says when a",
-              "search has solved it."),
-        i = "Give the mean return that does as `target`."),
+      c(paste(environment_label(vector_env), "has no reward threshold, so a search needs a",
+              "target."),
+        i = "Give the mean return that solves it as `target`."),
       class = "gym_error_argument", argument = "target", call = call
     )
   }
@@ -93,7 +93,7 @@ keeping_trainings <- function(code, trained, keep, result, what, files, call) {
       if (in_training) cnd$parent %||% cnd else cnd, paste("The", what), result(), finished,
       unique(paste0("gym_error_", c(what, "training"))), call,
       if (!is.null(files$checkpoint)) {
-        "The same call goes on from the checkpoints when what is wrong is fixed."
+        "After a fix, the same call resumes from the checkpoints."
       }
     )
   })

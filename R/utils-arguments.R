@@ -56,8 +56,8 @@ check_seeds <- function(seeds, call = rlang::caller_env()) {
   if (anyDuplicated(seeds)) {
     twice <- seeds[[anyDuplicated(seeds)]]
     gym_abort(
-      c(paste0("`seeds` must differ, as equal ones give equal results, but ", twice,
-               " is there more than once."),
+      c(paste0("`seeds` must be different, but ", twice,
+               " occurs more than once."),
         i = "`unique(seeds)` has each of them once."),
       class = "gym_error_argument", argument = "seeds", value = seeds, call = call
     )
@@ -136,7 +136,7 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
 check_suggested <- function(package, purpose, call = rlang::caller_env()) {
   if (!requireNamespace(package, quietly = TRUE)) {
     gym_abort(
-      c(paste0("To ", purpose, " takes the package ", package, "."),
+      c(paste0("The package ", package, " is required to ", purpose, "."),
         i = paste0("`install.packages(\"", package, "\")` installs it.")),
       class = "gym_error_argument", call = call
     )

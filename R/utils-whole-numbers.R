@@ -47,9 +47,9 @@ abort_without_bit64 <- function(digits) {
 
 abort_whole <- function(digits) {
   reason <- if (startsWith(digits, "-")) {
-    "is the smallest int64, which is bit64's NA: no number in R can hold it."
+    "is the smallest int64, which is bit64's NA: R cannot represent it."
   } else {
-    "is a uint64 beyond 2^63 - 1, the largest that R and bit64 can hold."
+    "is a uint64 beyond 2^63 - 1, the largest that R and bit64 can represent."
   }
   gym_abort(paste("The integer", digits, reason), class = "gym_error_space", call = NULL)
 }

@@ -207,7 +207,7 @@ test_that("a training whose weights become NaN ends with the last good ones", {
   expect_identical(coef(cnd$result$policy), coef(learn(3)$policy))
   # Returns that are not finite are found before anything is learned from them.
   broken <- fake_environment(function(seed, step, action) if (step == 2L) Inf else 1)
-  expect_error(quiet_learning(agent_ppo(), broken, iterations = 1), "no finite number",
+  expect_error(quiet_learning(agent_ppo(), broken, iterations = 1), "not a finite number",
                class = "gym_error_agent")
 })
 
@@ -223,7 +223,7 @@ test_that("agents refuse policies, spaces and settings that they cannot learn wi
   refused(agent_dqn(), policy_network(c(NA, NA), output = NA), box, "each action of a Discrete")
   refused(agent_dqn(), greedy, fake_environment(), "a value for each of 2 actions")
   picture <- fake_environment(observation_space = space_box(0, 1, shape = c(2, 2)))
-  refused(agent_ppo(), NULL, picture, "observations are vectors")
+  refused(agent_ppo(), NULL, picture, "observations that are vectors")
   expect_error(agent_ppo(batch = 99, batch_steps = 64), "`batch` must be at most",
                class = "gym_error_argument")
   expect_error(agent_dqn(batch = 99, memory = 64), class = "gym_error_argument")

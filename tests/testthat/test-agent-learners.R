@@ -278,7 +278,7 @@ test_that("off-policy Monte Carlo weighs returns by what the policy would have d
     expect_equal(came$agent$visited[1, 2], visits)
   }
   expect_identical(agent_policy(came$agent)$q, sticks$q)
-  expect_error(agent_monte_carlo(target_policy = sticks), "give `importance`",
+  expect_error(agent_monte_carlo(target_policy = sticks), "needs `importance`",
                class = "gym_error_argument")
 })
 
@@ -389,15 +389,15 @@ test_that("what cannot be learned so is refused", {
   refused(agent_q(temperature = 0), "`temperature` must be a number of at least")
   refused(begins(started(agent_q(epsilon = function(taken) 2)), 0L),
           "The function `epsilon` must return a number from 0 to 1, and after 0 steps")
-  refused(state_values(agent_q()), "what was learned by a table")
+  refused(state_values(agent_q()), "a learner of a table")
   begin <- policy_table(matrix(0, 4, 2))
   refused(learn_q(walk_model(), iterations = 1, policy = begin, features = function(x) cbind(x)),
-          "A table to begin with is for learners of a table")
+          "Only a learner of a table with a column for each action")
   refused(agent_monte_carlo(visits = "last"), "one of \"first\", \"every\"")
   box <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
   refused(learn_q(box, iterations = 1), "observations that can be counted")
   refused(learn_q(walk_model(), iterations = 1, policy = policy_random()), "a table of values")
-  refused(state_values(3), "what was learned by a table")
+  refused(state_values(3), "a learner of a table")
 })
 
 test_that("among actions with equal values a learner draws, but not among forbidden ones", {

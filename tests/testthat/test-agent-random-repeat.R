@@ -112,7 +112,7 @@ test_that("bad arguments are refused before anything is made, naming argument an
   bad(seeds = numeric(), message = "`seeds`")
   bad(seeds = c(1, 2.5), message = "`seeds[2]` must be a whole number")
   bad(seeds = c(1, NA), message = "`seeds[2]`")
-  bad(seeds = c(3, 1, 3), message = "`seeds` must differ")
+  bad(seeds = c(3, 1, 3), message = "`seeds` must be different")
   bad(rounds = 0, message = "`rounds`")
   bad(env = NA, message = "`env`")
   bad(policy = policy_random(), message = "must be a policy with weights")

@@ -398,7 +398,7 @@ test_that("another kind of server is distinguished from a Gym server", {
   withr::defer(process$kill())
   while (process$is_alive() && !length(readLines(log))) Sys.sleep(0.05)
   client <- create_GymClient(sub(".*(http://[0-9.:]+).*", "\\1", readLines(log)[[1]]))
-  expect_error(env_list_all(client), "not what a Gym server sends", class = "gym_error_connection")
+  expect_error(env_list_all(client), "not come from a Gym server", class = "gym_error_connection")
   expect_error(env_create(client, "CartPole-v1"), class = "gym_error_http_501")
 })
 

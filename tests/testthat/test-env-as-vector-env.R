@@ -37,7 +37,7 @@ test_that("what was made before is played as it is, and stays open", {
   expect_identical(seen$num_envs, 3L)
   seen$close()
   expect_true(env$is_open)
-  expect_error(as_vector_env(env, num_envs = 4), "`num_envs` is for an environment that is made",
+  expect_error(as_vector_env(env, num_envs = 4), "`num_envs` is for an environment given by its id",
                class = "gym_error_argument")
   expect_error(as_vector_env(1), class = "gym_error_argument")
 })

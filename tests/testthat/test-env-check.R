@@ -96,13 +96,13 @@ test_that("an observation that does not fit its space is found", {
 test_that("what a step must not return is found", {
   check <- check_env(steps_with(function(env, out) "far"), max_steps = 5)
   expect_identical(check$severity, c("wrong", "note"))
-  expect_match(check$finding[[1]], "must return a list, and returned \"far\" in step 1 of the")
+  expect_match(check$finding[[1]], "must return a list, but returned \"far\" in step 1 of the")
   for (name in c("observation", "reward", "terminated", "truncated")) {
     env <- steps_with(function(env, out) out[names(out) != name])
     check <- check_env(env, max_steps = 5)
     expect_identical(check$finding[check$severity == "wrong"], paste0(
       "`step()` must return a list with an element `", name,
-      "`, and in step 1 of the episode with seed 1 there is none."
+      "`, which is missing in step 1 of the episode with seed 1."
     ))
   }
   changed <- function(...) steps_with(function(env, out) utils::modifyList(out, list(...)))
@@ -173,18 +173,18 @@ test_that("drawing from the session's generator is found, which stays as it was"
   set.seed(5)
   check <- check_env(env)
   expect_identical(runif(1), expected)
-  expect_match(check$finding[[1]], "`reset()` moves the session's random generator", fixed = TRUE)
+  expect_match(check$finding[[1]], "`reset()` uses the session's random generator", fixed = TRUE)
   set_seed <- steps_with(function(env, out) {
     set.seed(1)
     out
   })
-  expect_finding(set_seed, "seeds", "`step()` moves the session's random generator")
+  expect_finding(set_seed, "seeds", "`step()` uses the session's random generator")
 })
 
 test_that("an environment that never ends is a note, and no mistake", {
   env <- steps_with(function(env, out) result(env, min(env$place, 4), terminated = FALSE))
   env$observation_space <- space_discrete(1000)
-  expect_finding(env, "end", "No episode ended within 20 steps: an environment that never ends is",
+  expect_finding(env, "end", "No episode ended within 20 steps: an environment that never ends",
                  "note", max_steps = 20)
 })
 
@@ -358,9 +358,9 @@ test_that("a model that says what is played is found to be right", {
   expect_identical(nrow(check_env(model_env(gym_model(slippery), num_envs = 4))), 0L)
   # Where it plays otherwise than its model says, in either direction.
   expect_finding(modelled(gym_model(slippery, start = 1)), "model",
-                 "and never led to state 2 in play, for which the model has the probability 0.3")
+                 "and never led to state 2 in play; the probability in the model is 0.3")
   expect_finding(modelled(walk_model(), slips = 0.3), "model",
-                 "in play, and the model gives that the probability 0.")
+                 "in play, which has the probability 0 in the model.")
 })
 
 test_that("starts, rewards and ends that a model does not have are found", {
@@ -393,12 +393,12 @@ test_that("copies that share another environment, and so move each other, are fo
   }
   shared <- around(function(self) inner$reset(seed = sample(1e6, 1)),
                    function(self, action) inner$step(action))
-  text <- paste("play side by side, as in `rollout()`, move each other. They share the environment",
-                "`inner`: each makes one of its own when `reset()` has")
+  text <- paste("played together, as in `rollout()`, move each other. They share the environment",
+                "`inner`: let each make its own, by `if (is.null(self$own))")
   expect_finding(shared, "copies", text)
   given <- around(function(self) self$inner$reset(seed = sample(1e6, 1)),
                   function(self, action) self$inner$step(action), inner = inner)
-  expect_finding(given, "copies", "self$own <- gym_make(\"Walk\", seed = 1)`.")
+  expect_finding(given, "copies", "self$own <- gym_make(\"Walk\", seed = 1)` in `reset()`.")
   gym_register("Walk-v8", inner)
   gym_register("Walker-v8", function() shared)
   withr::defer(lapply(c("Walk-v8", "Walker-v8"), gym_unregister))

@@ -100,7 +100,7 @@ test_that("several sub-environments whose frames are wanted are refused, however
     rollout(env, policy_random(), frames = TRUE, num_envs = num_envs, client = no_client())
   }
   for (env in list("CartPole-v1", gym_wrap("CartPole-v1", "ClipReward"), "Drawn-v0")) {
-    cnd <- expect_error(play(env, 4), "`num_envs` must be 1 where frames are kept, not 4",
+    cnd <- expect_error(play(env, 4), "`num_envs` must be 1 to keep frames, not 4",
                         class = "gym_error_argument")
     expect_identical(cnd$argument, "num_envs")
   }

@@ -68,7 +68,7 @@ test_that("a reset of the class may take seed and options", {
   env <- options_class$new()
   env$reset(seed = 4, options = list(a = 1))
   expect_identical(given, list(seed = 4, options = list(a = 1)))
-  expect_error(walk_class$new()$reset(options = list(a = 1)), "takes no options",
+  expect_error(walk_class$new()$reset(options = list(a = 1)), "does not accept options",
                class = "gym_error_argument")
 })
 

@@ -144,7 +144,7 @@ test_that("what a function returns is checked, and the environment goes on", {
   })
   env$reset(seed = 1)
   once <- FALSE
-  expect_error(env$step(1), "`observation_space` says which", class = "gym_error_space")
+  expect_error(env$step(1), "the new one as `observation_space`", class = "gym_error_space")
   once <- TRUE
   expect_length(env$step(1)$observation, 2)
   many <- gym_wrap(walk(TRUE), "TransformReward", func = function(r) ifelse(r > 0, NA, r))

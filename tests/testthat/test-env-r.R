@@ -84,7 +84,7 @@ test_that("options reach a reset that takes them, and are refused by one that do
   )
   expect_identical(env$reset(), 0L)
   expect_identical(env$reset(options = list(start = 2)), 2L)
-  expect_error(local_walk()$reset(options = list(start = 2)), "`reset()` of Walk takes no options",
+  expect_error(local_walk()$reset(options = list(start = 2)), "of Walk does not accept options",
                fixed = TRUE, class = "gym_error_argument")
   expect_error(env$reset(options = 3), "a list with names", class = "gym_error_argument")
 })
@@ -233,9 +233,9 @@ test_that("what a step returns is refused in the step that returned it", {
   with <- function(...) utils::modifyList(good, list(...), keep.null = TRUE)
   refused(NULL, "`step()` of Walk in step 2 of the episode")
   refused(3, "must return a list, not 3")
-  refused(good[-3], "returned lacks `terminated`; it has `observation`, `reward`.")
-  refused(good[-1], "returned lacks `observation`")
-  refused(good[-2], "returned lacks `reward`")
+  refused(good[-3], "lacks `terminated`; it has `observation`, `reward`.")
+  refused(good[-1], "lacks `observation`")
+  refused(good[-2], "lacks `reward`")
   refused(with(terminated = NA), "must be TRUE or FALSE, not NA")
   refused(with(terminated = c(TRUE, FALSE)), "`terminated`")
   refused(with(truncated = "no"), "must be TRUE or FALSE, not \"no\"")
@@ -243,7 +243,7 @@ test_that("what a step returns is refused in the step that returned it", {
   refused(with(reward = NaN), "must be a number, not NaN")
   refused(with(reward = 1:2), "must be a number, not 1:2")
   refused(with(reward = "1"), "must be a number, not \"1\"")
-  refused(utils::modifyList(good, list(reward = I(list(1)))), "`reward` of what")
+  refused(utils::modifyList(good, list(reward = I(list(1)))), "`reward` of the result")
   space <- "gym_error_space"
   refused(with(observation = 4), "not in its space <Discrete 7 from -3>", space)
   refused(with(observation = 0.5), "one whole number", space)
@@ -252,7 +252,8 @@ test_that("what a step returns is refused in the step that returned it", {
   refused(with(observation = "left"), "The value \"left\" does not fit", space)
   env <- local_walk(step = function(self, action) with(info = 3))
   env$reset()
-  expect_error(env$step(0), "`info` of what .* must be a list, not 3", class = "gym_error_argument")
+  expect_error(env$step(0), "`info` of the result .* must be a list, not 3",
+               class = "gym_error_argument")
 })
 
 test_that("an observation of numbers must have its shape, its type and its bounds", {

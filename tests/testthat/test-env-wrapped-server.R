@@ -109,7 +109,7 @@ test_that("a wrapper of the server's over one in R is refused, and so are calls 
   expect_error(gym_wrap(wrapped, "TimeLimit", max_episode_steps = 3), late,
                class = "gym_error_argument")
   expect_error(gym_make(wrapped, wrappers = list(list("TimeLimit", max_episode_steps = 3))), late)
-  expect_error(env_create(client, wrapped), "calls a function of R", class = "gym_error_argument")
+  expect_error(env_create(client, wrapped), "calls an R function", class = "gym_error_argument")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", func = function(obs) 1), "needs `obs`")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", f = sqrt), "has no argument `f`")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", function(r) r), "as `func = function")

@@ -19,7 +19,7 @@ test_that("what came packed is not unpacked", {
   skip_unless_all()
   # It would be good JSON.
   client <- create_GymClient(local_bad_server("packed"))
-  expect_error(env_list_all(client), "not what a Gym server sends", class = "gym_error_connection")
+  expect_error(env_list_all(client), "not come from a Gym server", class = "gym_error_connection")
 })
 
 test_that("headers without an end are ended", {

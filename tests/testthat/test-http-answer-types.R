@@ -249,7 +249,7 @@ test_that("lists have columns of their types", {
   for (registry in c('{"environments":3}', '{"environments":[{"id":3}]}',
                      '{"environments":[{"id":"a","max_episode_steps":"b"}]}')) {
     say(server, "/v1/registry/" = answers(registry))
-    expect_wrong(env_registry(server), "cannot be right")
+    expect_wrong(env_registry(server), "is invalid")
   }
   for (all_envs in c("3", '{"all_envs":3}', '{"all_envs":{"a":1}}', '{"all_envs":["a"]}')) {
     say(server, "/v1/envs/" = answers(all_envs))

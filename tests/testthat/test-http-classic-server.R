@@ -56,7 +56,7 @@ test_that("a space of which that server sends only the name passes values as the
   expect_length(env_reset(client, id), 3)
   observed <- env_observation_space_info(client, id)
   expect_output(print(observed), "Tuple (not described)", fixed = TRUE)
-  expect_error(space_sample(observed), "no more .* than its name", class = "gym_error_argument")
+  expect_error(space_sample(observed), "only the name", class = "gym_error_argument")
   expect_type(env_step(client, id, 0)$reward, "double")
 })
 

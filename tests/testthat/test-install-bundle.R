@@ -89,7 +89,7 @@ test_that("an earlier bundle stays until the new one is complete", {
   expect_error(gym_server_bundle(dir), "GYM_UV", class = "gym_error_install")
   local_failing_uv("error: Failed to fetch")
   expect_error(
-    suppressMessages(gym_server_bundle(dir)), "network was not reached", class = "gym_error_install"
+    suppressMessages(gym_server_bundle(dir)), "network is unavailable", class = "gym_error_install"
   )
   expect_identical(list.files(dir, recursive = TRUE), before)
   expect_identical(list.files(install_root()), "install.log")

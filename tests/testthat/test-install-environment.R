@@ -18,7 +18,7 @@ test_that("uv installs a Python, or takes one of this machine's", {
   expect_match(calls_of(uv)[2L], "--no-python-downloads --python >=3.10 /e/venv", fixed = TRUE)
   uv <- local_failing_uv("error: Failed to download `https://me:secret@python.example/`")
   error <- expect_error(make_venv("/e", source_of(uv), NULL), class = "gym_error_install")
-  expect_match(conditionMessage(error), "Python 3.12, and found none on this machine")
+  expect_match(conditionMessage(error), "Python 3.12, and found no suitable one on this machine")
   expect_match(conditionMessage(error), "UV_PYTHON_INSTALL_MIRROR", fixed = TRUE)
   expect_false(any(grepl("secret", c(unlist(error), readLines(install_log())), fixed = TRUE)))
 })

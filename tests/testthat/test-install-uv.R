@@ -112,7 +112,7 @@ test_that("the pinned uv has a checksum for each system, and this system a name"
     expect_true(uv_target() %in% names(uv_release$checksums))
   }
   local_binding("system_name", function() "sunos-sparc")
-  expect_error(install_uv(NULL), "GYM_PYTHON name that Python", class = "gym_error_install")
+  expect_error(install_uv(NULL), "GYM_PYTHON to that Python", class = "gym_error_install")
 })
 
 test_that("uv is downloaded, and run only when its checksum is right", {
@@ -156,7 +156,7 @@ test_that("a download that fails says what else can be done", {
   error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
   expect_match(conditionMessage(error), "HTTPS_PROXY", fixed = TRUE)
   expect_match(conditionMessage(error), "by hand", fixed = TRUE)
-  expect_match(conditionMessage(error), "-m pip install '?/.*/server'?`, and have GYM_PYTHON name")
+  expect_match(conditionMessage(error), "-m pip install '?/.*/server'?`, and set GYM_PYTHON to")
 })
 
 test_that("a download shows no password, and is not larger than it may be", {

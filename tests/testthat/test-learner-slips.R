@@ -18,7 +18,7 @@ refused <- function(code, ...) {
 test_that("a schedule that never explores is refused, the number 0 is not", {
   refused(
     agent_q(epsilon = schedule_linear(0, 0, 100)), "`epsilon` is a schedule that is 0",
-    "schedule_linear(1, 0.1", "give the number 0"
+    "schedule_linear(1, 0.1", "give 0"
   )
   refused(learn_sarsa(walk, iterations = 1, epsilon = function(taken) 0), "never explores")
   expect_s3_class(agent_q(epsilon = 0), "gym_agent")
@@ -30,7 +30,7 @@ test_that("a schedule that never explores is refused, the number 0 is not", {
 
 test_that("a model that ends nowhere, or not from everywhere, needs `max_steps` to learn from", {
   loop <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = 1), id = "Loop")
-  cnd <- expect_error(learn_q(loop, iterations = 1), "Episodes of Loop have no end")
+  cnd <- expect_error(learn_q(loop, iterations = 1), "Episodes of Loop never end")
   # At once, and not as a training that broke off.
   expect_false(inherits(cnd, "gym_error_training"))
   refused(solve_mdp(loop), "With a discount of 1 some values are infinite", "Give a `discount`")
@@ -38,7 +38,7 @@ test_that("a model that ends nowhere, or not from everywhere, needs `max_steps` 
     state = c(0, 0, 1), action = c(0, 1, 0), next_state = c(1, 2, 1), reward = 1
   ), id = "Trap")
   refused(
-    learn_q(trap, iterations = 1), "An episode of Trap that comes to state 1 has no end",
+    learn_q(trap, iterations = 1), "An episode of Trap that reaches state 1 never ends",
     "Give `max_steps`"
   )
   expect_identical(nrow(learn_q(trap, iterations = 2, max_steps = 5, seed = 1)$history), 2L)
@@ -52,7 +52,7 @@ test_that("an action that a state lacks is never learned, and refused with those
   expect_identical(given$agent$weights[3L, 2L], -Inf)
   refused(
     learn_td(lacks, function(state) rep(1L, length(state)), iterations = 1, seed = 1),
-    "Action 1 cannot be taken in state 2", "What can be taken there: 0."
+    "Action 1 cannot be taken in state 2", "Valid actions there: 0."
   )
 })
 
@@ -84,5 +84,5 @@ test_that("a table of another size, and seeds that repeat, are refused with both
     learn_monte_carlo(walk, iterations = 1, importance = "weighted",
                       target_policy = policy_table(matrix(0, 5, 2))), "has 5 rows"
   )
-  refused(learn_q(walk, iterations = 1, seeds = c(1, 2, 1)), "but 1 is there", "unique(seeds)")
+  refused(learn_q(walk, iterations = 1, seeds = c(1, 2, 1)), "but 1 occurs", "unique(seeds)")
 })

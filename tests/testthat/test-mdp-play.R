@@ -72,7 +72,7 @@ test_that("a model whose episodes have no end is played with a limit of steps on
     function(...) rollout(ring, policy_random(), seed = 1, ...),
     function(...) learn_q(ring, iterations = 1, seed = 1, ...)
   )) {
-    expect_error(play(), "Episodes of Ring have no end.*max_steps", class = "gym_error_argument")
+    expect_error(play(), "Episodes of Ring never end.*max_steps", class = "gym_error_argument")
     expect_no_error(play(max_steps = 5))
   }
   limited <- gym_model(as.data.frame(ring), start = 0, max_episode_steps = 3)

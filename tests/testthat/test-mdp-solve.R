@@ -38,7 +38,7 @@ test_that("values without an end are refused, with what to give", {
   expect_error(solve_mdp(circle), "rewards go on.*`discount` below 1, or a `horizon`",
                class = "gym_error_argument")
   costs <- gym_model(data.frame(state = 0:1, action = 0, next_state = 1:0, reward = -1))
-  expect_error(solve_mdp(costs), "have no end, whatever is done", class = "gym_error_argument")
+  expect_error(solve_mdp(costs), "never end, and without a discount", class = "gym_error_argument")
   expect_equal(solve_mdp(circle, discount = 0.5)$start_value, 2)
   expect_equal(solve_mdp(circle, horizon = 7)$start_value, 7)
   for (method in c("value_iteration", "policy_iteration")) {
@@ -69,7 +69,7 @@ test_that("with a horizon the best action depends on the steps that are left", {
   expect_equal(solved$start_value, 7)
   expect_identical(solved$actions[1, ], c(0L, 0L, 0L, 0L, 1L))
   expect_null(solved$policy)
-  expect_error(predict(solved, 0), "counts steps", class = "gym_error_argument")
+  expect_error(predict(solved, 0), "depends on the step", class = "gym_error_argument")
   expect_equal(solve_mdp(model, policy = c(0, 0), horizon = 5)$start_value, 5)
   expect_output(print(solved), "within 5 steps by a policy that counts them  7", fixed = TRUE)
 })
@@ -107,7 +107,7 @@ test_that("policies that do not fit the model are refused", {
   refused(policy_table(matrix(0, 3, 2)), "has 4 states and 2 actions")
   barred <- gym_model(walk_table()[-3, ], start = 1)
   expect_error(solve_mdp(barred, policy = c(0, 0, 0, 0)),
-               "takes action 0 in state 2, where the model does not have it",
+               "takes action 0 in state 2, where the model does not have that action",
                class = "gym_error_argument")
   expect_error(solve_mdp(walk_model(), discount = 1.5), "above 0 and at most 1",
                class = "gym_error_argument")
@@ -337,7 +337,7 @@ test_that("what no memory holds is refused, with its number", {
     state = 0, action = 0, next_state = c(1:299, 4e5), probability = 1 / 300, reward = 0
   )
   model <- gym_model(wide, start = 0)
-  expect_error(solve_mdp(model), "takes tables of 120,000,300 numbers",
+  expect_error(solve_mdp(model), "needs tables of 120,000,300 numbers",
                class = "gym_error_argument")
   expect_error(solve_mdp(walk_model(), horizon = 1e8), "400,000,000 numbers",
                class = "gym_error_argument")

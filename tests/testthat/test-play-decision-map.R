@@ -111,7 +111,7 @@ test_that("ranges are given, usual, the bounds, or those of the path", {
   env <- fake_environment(observation_space = box_space(c(-5, -Inf, -1, -1), c(7, Inf, 1, 1)))
   path <- data.frame(obs_1 = c(1, 2), obs_2 = c(10, 30))
   expect_equal(ends(decision_map(env, policy_network(), 1, 2, path = path)), c(-5, 7, 9, 31))
-  expect_error(decision_map(env, policy_network(), 1, 2), "range of obs_2 to show is unknown",
+  expect_error(decision_map(env, policy_network(), 1, 2), "range of obs_2 is unknown",
                class = "gym_error_argument")
   beyond <- data.frame(pole_angle = c(0, 1), pole_angular_velocity = c(0, 1))
   expect_equal(ends(pole_map(path = beyond))[2], 1)
@@ -157,15 +157,15 @@ test_that("what cannot be mapped says why", {
     expect_error(decision_map(env, policy, ...), message, fixed = TRUE,
                  class = "gym_error_argument")
   }
-  bad(policy_random(), cartpole(), message = "a random policy draws its actions")
-  bad(function(observation) 1, message = "What is observed and done is known of networks")
+  bad(policy_random(), cartpole(), message = "a random policy ignores the observation")
+  bad(function(observation) 1, message = "a decision map needs a network")
   bad("CartPole-v1", message = "`policy` must be a policy")
   one <- fake_environment(observation_space = box_space(-1, 1),
                           action_space = box_space(-1, 1))
   bad(policy_network(c(1, 1), c("tanh", "tanh")), one, 1, 1, message = "observes only one")
   pairs <- fake_environment(observation_space = space_text(3), id = "Pairs-v0")
   bad(function(observation) 0L, pairs,
-      message = "what is observed in Pairs-v0 is of")
+      message = "observations in Pairs-v0 are of")
   several <- fake_environment(action_space = new_space(
     list(name = "MultiBinary", shape = list(2L), dtype = "int8")
   ))

@@ -199,7 +199,7 @@ test_that("a plan that is set again after it broke is used again", {
   local_plan(future::cluster, workers = cluster)
   tools::pskill(worker_pids(), tools::SIGKILL)
   Sys.sleep(0.5)
-  expect_warning(played <- play(), "takes no more futures", class = "gym_warning_worker")
+  expect_warning(played <- play(), "accepts no more futures", class = "gym_warning_worker")
   expect_identical(played, alone)
   expect_identical(plan_kind(), "none")
   expect_no_warning(play())

@@ -55,7 +55,7 @@ test_that("what is no number of workers, or for no sub-environments, is refused"
                class = "gym_error_argument")
   cnd <- expect_error(
     rollout("CartPole-v1", policy_random(), num_workers = 2, client = client),
-    "has a vector implementation", class = "gym_error_argument"
+    "own vector implementation", class = "gym_error_argument"
   )
   expect_identical(cnd$argument, "num_workers")
   expect_error(gym_make("CartPole-v1", num_envs = 2, vectorization_mode = "vector_entry_point",

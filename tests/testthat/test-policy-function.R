@@ -123,7 +123,7 @@ test_that("a function that cannot be asked about one observation fails before th
   }
   env <- fake_vector_env(3, ends = function(seed, step, action) step == 1L + seed %% 3L)
   cnd <- expect_error(rollout(env, drops, 3, seed = 1), class = "gym_error_argument")
-  expect_match(conditionMessage(cnd), "asked about one observation, before the first step")
+  expect_match(conditionMessage(cnd), "failed for a single observation, before the first step")
   expect_match(conditionMessage(cnd$parent), "number of dimensions")
   own <- function(observation) rlang::abort("no", class = "my_stop")
   expect_error(rollout(env, own, 3), class = "my_stop")

@@ -213,8 +213,8 @@ test_that("a model given for a policy names as_policy()", {
 
 test_that("a model must know the environment, whose actions it can predict", {
   policy <- as_policy(lm(action ~ pole_angle, made_up_steps()))
-  expect_error(act(policy, 1:4), "does not know what is observed", class = "gym_error_argument")
-  expect_error(act(policy, data.frame(pole_angle = 1)), "does not know what is observed",
+  expect_error(act(policy, 1:4), "does not know the observations", class = "gym_error_argument")
+  expect_error(act(policy, data.frame(pole_angle = 1)), "does not know the observations",
                class = "gym_error_argument")
   several <- new_space(list(
     name = "MultiDiscrete", shape = list(2L), dtype = "int64", nvec = list(2L, 3L),

@@ -251,7 +251,7 @@ test_that("weights that were given another shape by hand are named", {
   for (call in list(function() act(policy, 1:4), function() rollout(fake_environment(), policy),
                     function() plot(policy))) {
     cnd <- expect_error(call(), refusal, fixed = TRUE, class = "gym_error_argument")
-    expect_match(conditionMessage(cnd), "`t()` turns it", fixed = TRUE)
+    expect_match(conditionMessage(cnd), "`t()` transposes it", fixed = TRUE)
   }
   expect_error(policy_network(weights = numeric(10)), "a list of 2 matrices (2 x 4, 1 x 2)",
                fixed = TRUE, class = "gym_error_argument")

@@ -27,7 +27,7 @@ test_that("many observations give as many actions", {
 })
 
 test_that("a policy without an action space says so, and takes that of the environment", {
-  expect_error(act(policy_random(), 1:4), "does not know what actions there are",
+  expect_error(act(policy_random(), 1:4), "has no action space",
                class = "gym_error_argument")
   env <- fake_environment(action_space = discrete_space(7L))
   bound <- policy_bind(policy_random(), env)

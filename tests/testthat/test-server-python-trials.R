@@ -16,7 +16,7 @@ test_that("each Python is tried, and what it lacks is reported", {
   expect_identical(.Random.seed, before)
   expect_identical(trials$runs, c(FALSE, TRUE, FALSE, FALSE))
   expect_identical(trials$reason, c(
-    "No module named 'flask'", NA, "it ended without a word", "there is no such file"
+    "No module named 'flask'", NA, "it ended without output", "there is no such file"
   ))
   expect_identical(trials$version[[1]], "3.12.1")
   expect_match(trials$version[[2]], "^3[.][0-9]+[.][0-9]+$")

@@ -182,7 +182,7 @@ test_that("what could not be found out is wrong", {
   report()
   local_functions(sitrep_own_servers = function() stop("Unknown option: timeout_ms"))
   seen <- sitrep()
-  expect_match(seen$text, "could not be found out: Unknown option", fixed = TRUE)
+  expect_match(seen$text, "could not be determined: Unknown option", fixed = TRUE)
   expect_no_match(seen$text, "Nothing is wrong", fixed = TRUE)
 })
 

@@ -371,7 +371,7 @@ test_that("a log that cannot be written in the middle warns once and ends nothin
                               callback = callback)
   )
   expect_length(warnings, 1)
-  expect_match(warnings, "goes on without")
+  expect_match(warnings, "continues without")
   expect_identical(nrow(trained$history), 5L)
 })
 

@@ -215,7 +215,7 @@ test_that("a disk that is full in the middle warns once and ends nothing", {
                             checkpoint = file.path(folder, "search.rds"))
   )
   expect_length(warnings, 1)
-  expect_match(warnings, "goes on without")
+  expect_match(warnings, "continues without")
   expect_identical(nrow(search$rounds), 5L)
 })
 

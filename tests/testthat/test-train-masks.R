@@ -74,6 +74,6 @@ test_that("masks that forbid everything, do not fit or are not there are refused
   expect_error(learn(walk_model(), "mask"), "`mask` needs the infos of",
                class = "gym_error_argument")
   expect_error(agent_q(mask = 1), class = "gym_error_argument")
-  expect_error(agent_sarsa(mask = "mask", features = tile_coding(2, 2)), "`mask` is for a table",
+  expect_error(agent_sarsa(mask = "mask", features = tile_coding(2, 2)), "`mask` works",
                class = "gym_error_argument")
 })
