@@ -53,8 +53,8 @@ uv_works <- function(uv, timeout = 30) {
 }
 
 # The release to download if there is no uv, and the SHA-256 of its archives, as published with it
-# and kept by uv's makers in github.com/astral-sh/setup-uv,
-# src/download/checksum/known-checksums.json.
+# and kept by uv's makers in the file src/download/checksum/known-checksums.json of
+# github.com/astral-sh/setup-uv.
 uv_release <- list(
   version = "0.12.16",
   checksums = c(

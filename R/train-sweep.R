@@ -2,55 +2,55 @@
 
 #' Try settings of an agent
 #'
-#' Trains each setting with each seed, on the workers of the plan ([workers]) where there is one,
-#' and compares the settings as [compare_trainings()] does. A run that fails does not end the
-#' others.
+#' Train each setting with each seed, on the workers of the plan ([workers]) if there is one, and
+#' compare the settings as in [compare_trainings()]. A run that fails does not stop the others.
 #'
-#' The best of many settings has also been lucky, and the more so the more were tried: what its
-#' seeds say of it is too good. So `report_seeds`, which must be others, train it once more, and
-#' their figures are what can be reported.
+#' The best of many settings was also lucky, and more so the more you try, so the results of its
+#' seeds are too good. `report_seeds`, which must be different, train it once more. Report their
+#' results.
 #'
-#' The best setting is the one with the highest interquartile mean, or where trainings stop at a
-#' target the one that most runs reached it with, of equal ones the one with the smallest median of
-#' steps.
+#' The best setting is the one with the highest interquartile mean. If trainings stop at a target,
+#' it is the one with which most runs reached it, or, of equal ones, the one with the smallest
+#' median of steps.
 #'
-#' With `folder` each run is kept in a file. After an interrupt, a kill or an error the same call
-#' goes on with what is missing. Settings may be added.
+#' With `folder` each run is kept in a file. After an interrupt, a crash or an error, the same call
+#' resumes with the missing runs. You may add settings.
 #'
-#' @param agent The function that makes the agent, such as [agent_ars], without parentheses; or a
-#'   function of yours that does.
+#' @param agent The function that makes the agent, such as [agent_ars], without parentheses, or your
+#'   own.
 #' @param env The environment, as for [train_agent()].
-#' @param settings A data frame with a row for each setting, as [expand.grid()] makes it, with the
-#'   arguments of `agent` as columns.
-#' @param seeds The seeds of tuning, different whole numbers.
+#' @param settings A data frame with a row for each setting, such as the result of [expand.grid()],
+#'   with the arguments of `agent` as columns.
+#' @param seeds The seeds for tuning, different whole numbers.
 #' @param report_seeds `NULL`, the default, or the seeds with which the best setting is trained once
-#'   more, none of which is one of `seeds`.
-#' @param ... Further arguments of [train_agent()], such as `total_steps`, which one budget must be,
-#'   or `target`, and the environment's own. For `plot()` and `autoplot()` none.
-#' @param folder `NULL`, the default, or the folder to keep the runs in, which is made where it does
-#'   not exist.
+#'   more, all different from `seeds`.
+#' @param ... Further arguments of [train_agent()], such as `total_steps` (a single budget) or
+#'   `target`, and of the environment. For `plot()` and `autoplot()` none.
+#' @param folder `NULL`, the default, or the folder for the runs, which is created if it does not
+#'   exist.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param client As for [train_agent()].
 #' @param x A sweep.
 #' @param row.names,optional Not used.
-#' @param main The title of the picture; `NULL`, the default, names the environment.
+#' @param main The title of the picture. `NULL`, the default, names the environment.
 #' @param xlab,ylab,xlim,ylim As for [plot.gym_rollout()].
 #' @return An object of class `gym_sweep`, a list with the elements
 #'   \describe{
 #'     \item{settings}{The settings, with a column `setting`, their names.}
-#'     \item{trainings}{A list with the [gym_trainings] of each setting, `NULL` where no run ended.}
+#'     \item{trainings}{A list with the [gym_trainings] of each setting, `NULL` if no run finished.}
 #'     \item{runs}{A data frame with a row for each run: `setting`, `seed` and `error` (the message,
-#'       `NA` where there was none).}
-#'     \item{comparison}{What [compare_trainings()] says of the settings, `NULL` where none was
+#'       or `NA`).}
+#'     \item{comparison}{The result of [compare_trainings()] for the settings, `NULL` if none was
 #'       trained.}
 #'     \item{best}{The name of the best setting.}
 #'     \item{reported}{Its [gym_trainings] with `report_seeds`, or `NULL`.}
 #'     \item{seeds, report_seeds}{As given.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
-#'   } `as.data.frame()` gives the settings with the columns of the comparison's table, and `error`.
+#'   }
+#'   `as.data.frame()` returns the settings with the columns of the comparison's table, and `error`.
 #'   `plot()` draws the learning curves of all settings, a panel for each.
-#' @section Errors: `gym_error_argument` for an argument that is not what it should be;
-#'   `gym_error_checkpoint` where the folder has another sweep's runs.
+#' @section Errors: `gym_error_argument` for an invalid argument. `gym_error_checkpoint` if the
+#'   folder has the runs of another sweep.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' sweep <- sweep_agent(
