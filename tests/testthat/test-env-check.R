@@ -411,7 +411,7 @@ test_that("copies that share another environment, and so move each other, are fo
       list(observation = place, reward = 1, terminated = place == 9)
     }
   )
-  expect_finding(outside, "copies", "must be kept in `self`, not outside of it.")
+  expect_finding(outside, "copies", "in `self`, not outside it.")
   # Begins alike in all copies, so that only their steps show it.
   ticks <- around(
     function(self) place <<- 0,
@@ -420,7 +420,7 @@ test_that("copies that share another environment, and so move each other, are fo
       list(observation = place, reward = 1, terminated = place == 9)
     }
   )
-  expect_finding(ticks, "copies", "must be kept in `self`, not outside of it.")
+  expect_finding(ticks, "copies", "in `self`, not outside it.")
   own <- around(
     function(self) {
       if (is.null(self$own)) self$own <- gym_make("Walk-v8", seed = 1)
