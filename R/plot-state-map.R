@@ -16,7 +16,8 @@
 #' @param columns The number of columns of the grid, whose states are numbered row by row from the
 #'   upper left. `NULL`, the default, for a known environment: 12 for CliffWalking, and as many as
 #'   rows for FrozenLake.
-#' @param type What to show, a string: `"actions"`, the default, or `"q"`, the values of all actions.
+#' @param type What to show, a string: `"actions"`, the default, or `"q"`, the values of all
+#'   actions.
 #' @return A ggplot. `plot()` returns it invisibly.
 #' @section Errors: `gym_error_argument` if `type` is `"q"` and the policy is no table.
 #' @rdname plot.gym_state_map

@@ -18,7 +18,7 @@ is_installed <- function(package) {
     (is.na(minimum) || utils::packageVersion(package) >= minimum)
 }
 
-# Needs 60 packages of apt. The program ffmpeg, which the server's extra "video" has, writes the same.
+# It needs 60 packages of apt. ffmpeg, which the server's extra "video" has, writes the same files.
 too_large <- "av"
 
 goal_packages <- function(goal) {

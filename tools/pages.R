@@ -1,5 +1,5 @@
-# Installs the package with the pages of its vignettes into .r-library/, where browseVignettes("gym")
-# finds them, and says where they begin. Building them takes a minute or two, and is done once.
+# Builds the vignettes, installs the package with them into .r-library/, where browseVignettes("gym")
+# finds them, and prints where they begin. It builds them once, in a minute or two.
 source("tools/tarball.R")
 
 contents <- file.path(normalizePath(".r-library/gym"), "doc", "index.html")
@@ -26,12 +26,11 @@ install_pages <- function() {
 }
 
 if (!requireNamespace("rmarkdown", quietly = TRUE) || !rmarkdown::pandoc_available()) {
-  cat("\nThe pages that tell more need pandoc and the R packages knitr and rmarkdown to be built.\n",
-      "With these installed, `make demo` builds them.\n", sep = "")
+  cat("\nWith pandoc and the R packages knitr and rmarkdown, `make demo` builds the vignettes.\n")
   quit()
 }
 if (changed()) {
-  cat("\nBuilding the pages that tell more: this once, a minute or two.\n")
+  cat("\nBuilding the vignettes, once: a minute or two.\n")
   install_pages()
 }
 cat("\nWhere to go on: file://", contents, "\n", sep = "")

@@ -11,8 +11,8 @@ fewer_colours <- function(files, max = 32) {
   }
 }
 
-# The options of a vignette's chunks. What they draw has fewer colours, where magick is there; on the
-# site, where there is room, pictures are as pkgdown draws them.
+# Sets the options of a vignette's chunks. Their pictures get fewer colours if magick is there. The
+# site has room, so its pictures stay as pkgdown draws them.
 set_up_pictures <- function(height) {
   knitr::opts_chunk$set(collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height)
   if (identical(Sys.getenv("IN_PKGDOWN"), "true")) {

@@ -1,6 +1,6 @@
-# What the table of solved environments has: the target that is reported and where it comes from, the
-# one at which training stops, above it, so that the final evaluation reaches it, and how many seeds
-# are trained. The settings are the presets of the package (agent_presets()).
+# The trainings of the table of solved environments: the target that is reported and its source, the
+# target at which training stops (above it, so that the final evaluation reaches it), and the number
+# of seeds. The settings are the presets of the package (agent_presets()).
 #
 # Settings were tried on the seeds 1 to 99. The first choice of them is reported on the seeds from
 # 1001 on. Where it missed its goal and another one was chosen, again on the seeds 1 to 99, that is
