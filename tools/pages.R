@@ -1,5 +1,5 @@
-# Builds the vignettes, installs the package with them into .r-library/, where browseVignettes("gym")
-# finds them, and prints where they begin. It builds them once, in a minute or two.
+# Builds the vignettes once and installs the package with them into .r-library/, where
+# browseVignettes("gym") finds them. Prints where they begin.
 source("tools/tarball.R")
 
 contents <- file.path(normalizePath(".r-library/gym"), "doc", "index.html")
