@@ -18,6 +18,12 @@
 #' @section Errors: `gym_error_argument` for another `type`.
 #' @rdname plot.gym_comparison
 #' @exportS3Method ggplot2::autoplot
+#' @examplesIf gym:::can_start_server()
+#' trained <- lapply(list(ARS = agent_ars(), random = agent_random()), train_agent, "CartPole-v1",
+#'                   total_steps = 2000, target = Inf, seeds = 1:5, eval_episodes = 10)
+#' compared <- do.call(compare_trainings, trained)
+#' plot(compared)
+#' plot(compared, type = "improvement")
 autoplot.gym_comparison <- function(object, type = c("scores", "profile", "improvement"), ...) {
   check_dots_empty(...)
   type <- check_choice(type[1L], c("scores", "profile", "improvement"), arg = "type")
@@ -29,6 +35,7 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
   }
   bands <- object$by == "steps" || type == "profile"
   shape <- if (bands) "band" else "bar"
+  if (object$by == "steps") shape <- paste("seeds that have reached the target;", shape)
   notes <- if (length(object$notes)) paste0("note: ", object$notes)
   ids <- unique(object$runs$env_id)
   picture +
@@ -118,7 +125,7 @@ reached_picture <- function(x) {
       ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
     }) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
-    ggplot2::labs(x = training_steps_label, y = "share that has reached the target")
+    ggplot2::labs(x = training_steps_label, y = "share of seeds")
 }
 
 match_profile <- function(runs, profile) {

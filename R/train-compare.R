@@ -73,7 +73,8 @@
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' train <- function(agent) {
-#'   train_agent(agent, "CartPole-v1", total_steps = 3000, target = Inf, seeds = 1:5)
+#'   train_agent(agent, "CartPole-v1", total_steps = 2000, target = Inf, seeds = 1:5,
+#'               eval_episodes = 20)
 #' }
 #' ars <- train(agent_ars())
 #' hill <- train(agent_hill_climb(candidates = 16))

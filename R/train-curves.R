@@ -28,7 +28,7 @@
 #'   `lower`, `upper` (its standard error and 95% interval, doubles, `NA` if unknown) and `episodes`
 #'   (integer).
 #' @section Errors: `gym_error_argument` for an object that is neither a training nor a log, and for
-#'   a search by the tutorial's rule, which has no evaluations.
+#'   the result of [search_random()], which has no evaluations.
 #' @seealso [compare_trainings()], and [plot()][plot.gym_trainings()] for a picture.
 #' @export
 #' @examplesIf gym:::can_start_server()

@@ -129,14 +129,16 @@ trainings_lines <- function(x) {
   }
   done <- table[!table$interrupted, ]
   returns <- done$mean_return[!is.na(done$mean_return)]
+  # With `target = Inf` nothing can be solved.
+  has_target <- !is.null(x$target) && is.finite(x$target)
   c(
     paste0("Training in ", x$env_id, " by ", format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
-    if (nrow(done) && !is.null(x$target)) {
+    if (nrow(done) && has_target) {
       paste0("Solved with ", sum(done$solved), " of ", count_of(nrow(done), "seed"), " (target ",
              number_text(x$target), ")")
     },
-    if (length(returns) && !is.null(x$target)) reached_line(done$reached),
+    if (length(returns) && has_target) reached_line(done$reached),
     if (length(returns)) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))

@@ -55,7 +55,7 @@
 #' @examplesIf gym:::can_start_server()
 #' sweep <- sweep_agent(
 #'   agent_ars, "CartPole-v1", expand.grid(step_size = c(0.02, 0.1), noise = c(0.05, 0.1)),
-#'   seeds = 1:5, report_seeds = 1001:1005, total_steps = 2000, target = Inf
+#'   seeds = 1:5, report_seeds = 1001:1005, total_steps = 1000, target = Inf, eval_episodes = 10
 #' )
 #' sweep
 #' plot(sweep)

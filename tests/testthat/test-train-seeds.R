@@ -20,6 +20,8 @@ test_that("the training of each seed is the one that the seed makes alone", {
   weights <- coef(trained)
   expect_identical(rownames(weights), c("5", "2", "100000"))
   expect_identical(weights["2", ], coef(trained$trainings[["2"]]))
+  # Without a target there is nothing to reach.
+  expect_false(any(grepl("target|Solved", capture.output(print(trained)))))
 })
 
 test_that("a row for each seed says whether its final evaluation has reached the target", {
