@@ -306,6 +306,6 @@ shared_text <- function(definition) {
     return("Keep the state of an episode in `self`, not outside it.")
   }
   id <- get0(shared[[1L]], place)$spec$id
-  paste0("They share the environment `", shared[[1L]], "`: each makes one of its own when ",
-         "`reset()` has `if (is.null(self$own)) self$own <- gym_make(\"", id, "\", seed = 1)`.")
+  paste0("They share the environment `", shared[[1L]], "`: let each make its own, by ",
+         "`if (is.null(self$own)) self$own <- gym_make(\"", id, "\", seed = 1)` in `reset()`.")
 }

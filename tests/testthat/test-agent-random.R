@@ -70,7 +70,7 @@ test_that("each round draws fresh weights, the first too", {
 test_that("a search is a training by the tutorial's rule", {
   env <- fake_environment(reward = first_action)
   search <- search_random(env, rounds = 9, target = 13, seed = 2)
-  trained <- train_agent(agent_random(), env, policy_network(), iterations = 9, episodes = 5,
+  trained <- train_agent(agent_random(), env, policy_network(), iterations = 9L, episodes = 5,
                          target = 13, seed = 2, solved_by = "candidate")
   expect_s3_class(trained, c("gym_search", "gym_training"), exact = TRUE)
   same <- setdiff(names(search), c("elapsed", "template", "max_rounds", "provenance"))

@@ -103,8 +103,8 @@ test_that("drawing leaves the session's generator as it was", {
 test_that("what cannot be drawn is refused with the fix", {
   env <- local_drawn(NULL)
   env$reset()
-  expect_error(env$render(), "Drawn: it cannot be drawn", class = "gym_error_argument")
-  expect_error(rollout(env, policy_random(), frames = TRUE), "it cannot be drawn",
+  expect_error(env$render(), "Drawn cannot be drawn", class = "gym_error_argument")
+  expect_error(rollout(env, policy_random(), frames = TRUE), "cannot be drawn",
                class = "gym_error_argument")
   expect_error(as_vector_env(local_drawn(plots), num_envs = 2, frames = TRUE),
                "`num_envs` must be 1", class = "gym_error_argument")

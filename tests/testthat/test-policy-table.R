@@ -53,7 +53,7 @@ test_that("tables that do not fit are refused", {
   refused(policy_table(diag(2), epsilon = 2), "`epsilon` must be a number from 0 to 1")
   refused(policy_table(diag(2), temperature = 0), "`temperature` must be a number above 0")
   refused(rollout(walk_model(), policy_table(diag(3))),
-          "The policy's table has 3 rows and 3 columns, but R-model has 4 states and 2 actions.")
+          "The policy's table has 3 rows and 3 columns, but R-model has 4 states and 2 actions: ")
   refused(act(policy_table(diag(2)), 2L), "no row for the observation 2")
   box <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
   refused(rollout(box, policy_table(diag(2))), "observations that can be counted")

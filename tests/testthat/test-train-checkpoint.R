@@ -330,7 +330,7 @@ test_that("of two searches on one file the one that is further is kept, with a w
   quick$steps <- 30
   expect_silent(quick$write())
   slow$steps <- 10
-  expect_warning(slow$write(), "further", class = "gym_warning_checkpoint")
+  expect_warning(slow$write(), "ahead", class = "gym_warning_checkpoint")
   expect_silent(slow$write())
   expect_identical(steps_kept(), 30)
   # Where the other has ended it is overtaken.
