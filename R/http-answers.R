@@ -37,8 +37,17 @@ parsed_body <- function(response) {
     list(png = response$content)
   } else {
     check_json_size(response$content)
-    answer <- from_json(rawToChar(response$content))
-    if (is.list(answer)) answer
+    json_answer(response$content)
+  }
+}
+
+# Returns the answer, or NULL if it is no object. `tensors` is the part that only read_tensors() may
+# make.
+json_answer <- function(content) {
+  answer <- from_json(rawToChar(content))
+  if (is.list(answer)) {
+    answer$tensors <- NULL
+    answer
   }
 }
 
@@ -73,8 +82,8 @@ new_json_reader <- function(read_answer) {
     content <- response$content
     if (response$status_code == 200L && identical(response$type, json_type) &&
           length(content) <= small_answer) {
-      answer <- from_json(rawToChar(content))
-      if (is.list(answer)) read_answer(answer)
+      answer <- json_answer(content)
+      if (!is.null(answer)) read_answer(answer)
     }
   }
 }

@@ -52,9 +52,8 @@ uv_works <- function(uv, timeout = 30) {
   startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
-# The release to download if there is no uv, and the SHA-256 of its archives, as published with it
-# and kept by uv's makers in the file src/download/checksum/known-checksums.json of
-# github.com/astral-sh/setup-uv.
+# The release to download if there is no uv, and the SHA-256 of its archives, as published with it.
+# Their source is src/download/checksum/known-checksums.json in github.com/astral-sh/setup-uv.
 uv_release <- list(
   version = "0.12.16",
   checksums = c(

@@ -89,3 +89,10 @@ test_that("the server's answer to a step of sub-environments is read at once", {
   local_functions(tensors_answer = function(...) stop("it was parsed"))
   expect_identical(dim(env$step(c(0, 1))$observation), c(2L, 4L))
 })
+
+test_that("a JSON answer has no tensors, whatever the server calls a field", {
+  content <- charToRaw('{"reward":1,"tensors":{"observation":["text"]}}')
+  response <- response_of(content, type = json_type)
+  expect_identical(new_json_reader(identity)(response, NULL), list(reward = 1L))
+  expect_identical(parsed_body(response), list(reward = 1L))
+})
