@@ -24,7 +24,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
       found$note,
       if (any(interrupted)) paste(count_of(sum(interrupted), "interrupted run"), "left out")
     ),
-    steps = found$steps
+    steps = found$steps, by_end = found$by_end
   )
 }
 
@@ -76,7 +76,7 @@ run_scores <- function(trainings, curves, steps, call) {
   runs <- do.call(rbind, lapply(of_run, function(run) run[1L, c("training", "env_id", "seed")]))
   list(
     runs = data.frame(runs, steps = unname(ends), score = unname(score), row.names = NULL),
-    steps = at,
+    steps = at, by_end = by_end,
     note = if (!by_end) paste("scores are those of the learning curves after", number_text(at),
                               "steps")
   )
@@ -175,7 +175,9 @@ interval_of <- function(values, level) {
 
 score_table <- function(scores, drawn, level) {
   rows <- lapply(names(scores), function(label) {
-    do.call(rbind, lapply(names(score_statistics), function(name) {
+    # In one environment the median of the environments' means is the mean.
+    shown <- setdiff(names(score_statistics), if (length(scores[[label]]) == 1L) "median")
+    do.call(rbind, lapply(shown, function(name) {
       statistic <- score_statistics[[name]]
       interval <- interval_of(statistic(drawn[[label]]), level)
       data.frame(

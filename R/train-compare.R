@@ -6,13 +6,14 @@
 #' # Scores
 #'
 #' Trainings without a target (`target = Inf`) are compared by their scores, the mean returns of the
-#' final evaluations. If budgets differ, the learning curves are compared at the smallest number of
-#' steps that all have taken, and `print()` says so. The statistics are those of Agarwal et al.
-#' (2021):
+#' final evaluations. A training ends with the iteration that uses up its budget, so `print()` shows
+#' the steps that were taken; `steps` compares the learning curves at one number of steps instead.
+#' If budgets differ, that is the smallest number that all have taken, and `print()` says so. The
+#' statistics are those of Agarwal et al. (2021):
 #'
-#' * `mean` of all scores, `median` of the environments' mean scores (with one environment, the mean
-#'   again), and `iqm`, the interquartile mean: the mean of the middle half of all runs, which a few
-#'   lucky or failed seeds change little;
+#' * `mean` of all scores; `median` of the environments' mean scores, with several environments; and
+#'   `iqm`, the interquartile mean: the mean of the middle half of all runs, which a few lucky or
+#'   failed seeds change little;
 #' * the probability of improvement: the probability that a run of one agent scores higher than one
 #'   of another, averaged over the environments;
 #' * the performance profile: the share of runs that score more than each number.
@@ -103,6 +104,7 @@ compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, 
     gym_abort("There is nothing to compare: give trainings.", class = "gym_error_argument",
               argument = "...", call = call)
   }
+  check_different_runs(trainings, call)
   settings <- list(
     steps = steps, level = level, reps = as.integer(reps), seed = seed %||% draw_seed()
   )
@@ -140,6 +142,22 @@ stop_at_target <- function(trainings, call) {
     )
   }
   any(stops)
+}
+
+# Trainings with one name are one agent in several environments, or with other seeds.
+check_different_runs <- function(trainings, call) {
+  keys <- unlist(Map(function(x, label) {
+    vapply(each_training(x), function(one) paste(label, one$env_id, one$seed, sep = "\r"), "")
+  }, trainings, names(trainings)))
+  if (anyDuplicated(keys)) {
+    twice <- strsplit(keys[duplicated(keys)][[1L]], "\r", fixed = TRUE)[[1L]]
+    gym_abort(
+      c(paste0("Two trainings in ", twice[[2L]], " are called \"", twice[[1L]],
+               "\" and have the seed ", twice[[3L]], "."),
+        i = "Give each its own name: `compare_trainings(first = a, second = b)`."),
+      class = "gym_error_argument", argument = "...", value = twice[[1L]], call = call
+    )
+  }
 }
 
 # The number of runs of each training in each environment.
@@ -180,6 +198,15 @@ print.gym_comparison <- function(x, ...) {
   invisible(x)
 }
 
+# A training ends with the iteration that reaches its budget.
+steps_taken_line <- function(runs) {
+  taken <- split(runs$steps, factor(runs$training, unique(runs$training)))
+  ranges <- vapply(taken, function(steps) {
+    paste(unique(vapply(range(steps), whole_number_text, "")), collapse = " to ")
+  }, "")
+  paste("Steps taken:", paste(names(ranges), ranges, collapse = "; "))
+}
+
 comparison_lines <- function(x) {
   scores <- x$by == "scores"
   ids <- unique(x$runs$env_id)
@@ -207,9 +234,11 @@ comparison_lines <- function(x) {
   c(
     paste0(
       if (scores) "Scores" else "Steps to the target", if (!anyNA(where)) paste0(" in ", where),
-      if (scores) paste0(" after ", count_of(round(x$steps), "step")), ", ",
-      paste(seeds, collapse = " to "), " seed", if (max(seeds) > 1L) "s", " each"
+      if (scores) paste(if (x$by_end) " at a budget of" else " after",
+                        count_of(round(x$steps), "step")),
+      ", ", paste(seeds, collapse = " to "), " seed", if (max(seeds) > 1L) "s", " each"
     ),
+    if (scores && x$by_end) steps_taken_line(x$runs),
     if (!is.null(x$reference)) "Normalised: 0 is low, 1 is high of the reference",
     utils::capture.output(print(shown)),
     paste0(

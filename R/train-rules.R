@@ -1,4 +1,5 @@
-# Differences that make a comparison of trainings unfair: targets, budgets or rules of evaluation.
+# Differences that make a comparison of trainings unfair: targets, budgets, environments or rules of
+# evaluation.
 
 # The arguments that a training keeps for this, in addition to the target.
 kept_rules <- c("iterations", "total_steps", "max_steps", "eval_every", "eval_episodes",
@@ -13,14 +14,25 @@ unequal_rules <- function(trainings) {
   unlist(lapply(unname(by_env), function(those) {
     rules <- lapply(those, function(x) {
       one <- if (inherits(x, "gym_trainings")) x$trainings[[1L]] else x
-      c(list(target = one$target %||% Inf), one$rules)
+      c(list(target = one$target %||% Inf), one$rules, environment_settings(one))
     })
     c(
       unequal_text("targets", rules, "target"),
       unequal_text("budgets", rules, c("total_steps", "iterations")),
+      unequal_text("environments", rules, c("arguments", "wrappers")),
       unequal_text("rules of evaluation", rules, kept_rules[-(1:2)])
     )
   }))
+}
+
+# What `env_id` does not say of a training's environment, strings.
+environment_settings <- function(one) {
+  kwargs <- one$kwargs
+  values <- vapply(kwargs, describe_value, "")
+  list(
+    arguments = if (length(kwargs)) toString(paste(names(kwargs), "=", values)),
+    wrappers = if (length(one$provenance$wrappers)) toString(one$provenance$wrappers)
+  )
 }
 
 # `NULL` if all trainings have the same rules.

@@ -89,7 +89,8 @@ test_that("without a preset agents have their own defaults, and training needs a
   expect_error(search_ars(env, directions = numeric(), iterations = 1),
                class = "gym_error_argument")
   expect_error(search_ars("CartPole-v1", gravity = 1),
-               "presets of CartPole-v1 .*\"ars\".*environment: `gravity`", class = "gym_error_argument")
+               "presets of CartPole-v1 .*\"ars\".*environment: `gravity`",
+               class = "gym_error_argument")
   expect_error(search_cem("CartPole-v1"), "another agent: \"ars\"",
                class = "gym_error_argument")
   expect_error(agent_ars(4, 2, version = "V1"), "V1-t", class = "gym_error_argument")

@@ -9,7 +9,7 @@ test_that("scores are bars with intervals, a panel for each statistic", {
   bars <- layers_of(drawn(ggplot2::autoplot(compared)), "GeomPointrange")[[1]]
   expect_setequal(bars$x, compared$table$value)
   expect_setequal(bars$xmin, compared$table$lower)
-  expect_identical(nlevels(bars$PANEL), 3L)
+  expect_identical(nlevels(bars$PANEL), 2L)
   pair <- layers_of(drawn(ggplot2::autoplot(compared, "improvement")), "GeomPointrange")[[1]]
   expect_identical(pair$x, compared$improvement$probability)
 })

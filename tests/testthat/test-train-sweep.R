@@ -17,7 +17,7 @@ test_that("each setting is trained with each seed, as train_agent() does", {
   expect_identical(own$policy, one$policy)
   table <- as.data.frame(sweep)
   expect_identical(unique(table$noise), c(0.1, 1))
-  expect_identical(nrow(table), 6L)
+  expect_identical(nrow(table), 4L)
   expect_identical(table$value, sweep$comparison$table$value)
   expect_identical(nrow(sweep$runs), 10L)
 })
