@@ -25,7 +25,7 @@ def in_background(call):
     thread.start()
 
     def wait():
-        thread.join(30)
+        thread.join(120)
         return results[0]
 
     return wait
