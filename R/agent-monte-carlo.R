@@ -332,6 +332,5 @@ learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target
 # If the server's processes play the episodes, each iteration costs a request.
 default_episodes <- function(env, mask, exploring_starts, importance) {
   on_server <- rlang::is_string(env) && !is_registered(env) && !grepl(modelled_ids, env)
-  whole <- is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")
-  if (on_server && whole) 1000 else 10
+  if (on_server && learns_whole(mask, exploring_starts, importance)) 1000 else 10
 }

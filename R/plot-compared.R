@@ -65,9 +65,6 @@ scores_picture <- function(x) {
 shares_picture <- function(rows, x, geom) {
   labels <- unique(rows$training)
   rows$training <- factor(rows$training, labels)
-  marks <- lapply(named_colours(labels), function(colour) {
-    list(colour = colour, shape = NA, line = "solid")
-  })
   ggplot2::ggplot(rows, ggplot2::aes(
     .data[[x]], .data$share, colour = .data$training, fill = .data$training
   )) +
@@ -77,7 +74,7 @@ shares_picture <- function(rows, x, geom) {
     ) +
     geom +
     ggplot2::scale_fill_manual(values = named_colours(labels), guide = "none") +
-    key_of_marks(marks) +
+    key_of_marks(line_marks(labels)) +
     ggplot2::coord_cartesian(ylim = c(0, 1))
 }
 

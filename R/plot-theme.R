@@ -98,6 +98,11 @@ key_of_marks <- function(marks) {
   )
 }
 
+# The marks of lines, for key_of_marks().
+line_marks <- function(labels) {
+  lapply(named_colours(labels), function(colour) list(colour = colour, shape = NA, line = "solid"))
+}
+
 # A key with as many rows as fit into four inches.
 rows_of_key <- function(labels, ...) {
   ggplot2::guide_legend(nrow = ceiling(sum(nchar(labels) + 6) / 54), byrow = TRUE, ...)

@@ -45,9 +45,7 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
   target <- common_target(trainings)
   alone <- curves[curves$label %in% names(which(table(curves$label) == 1L)), ]
   seeds <- any(vapply(trainings, inherits, NA, "gym_trainings"))
-  marks <- lapply(named_colours(names(trainings)), function(colour) {
-    list(colour = colour, shape = NA, line = "solid")
-  })
+  marks <- line_marks(names(trainings))
   ggplot2::ggplot(curves, ggplot2::aes(.data$steps, colour = .data$label)) +
     ggplot2::geom_ribbon(
       ggplot2::aes(ymin = .data$lower, ymax = .data$upper, fill = .data$label), alpha = 0.25,
@@ -102,7 +100,7 @@ common_target <- function(trainings) {
 curve_places <- 200L
 
 evaluation_curves <- function(x, label, call) {
-  each <- lapply(if (inherits(x, "gym_trainings")) x$trainings else list(x), evaluation_curve)
+  each <- lapply(each_training(x), evaluation_curve)
   each <- each[vapply(each, nrow, 0L) > 0L]
   if (!length(each)) {
     gym_abort(

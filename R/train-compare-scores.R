@@ -130,7 +130,7 @@ environment_threshold <- function(one) {
   } else {
     one$env$spec$reward_threshold
   }
-  threshold <- own_targets[[one$env_id]] %||% registered
+  threshold <- training_target(NULL, list(id = one$env_id, reward_threshold = registered))
   if (length(threshold) && !is.na(threshold)) threshold
 }
 

@@ -128,8 +128,6 @@ curves_of <- function(trainings) {
   }, trainings, names(trainings))))
 }
 
-each_training <- function(x) if (inherits(x, "gym_trainings")) unname(x$trainings) else list(x)
-
 # All have a target or none has: otherwise there is nothing to compare them by.
 stop_at_target <- function(trainings, call) {
   stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)

@@ -72,3 +72,6 @@ given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {
   }
   only_results(values, c("gym_training", "gym_trainings"), call, unique)
 }
+
+# The training of each seed.
+each_training <- function(x) if (inherits(x, "gym_trainings")) unname(x$trainings) else list(x)

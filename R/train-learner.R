@@ -135,8 +135,13 @@ learn_episodes <- function(state, vector_env, settings, call) {
 
 # Whether a learner learns between episodes, and they can be played with nothing but a policy.
 plays_whole <- function(agent) {
-  inherits(agent, "gym_agent_monte_carlo") && !agent$exploring_starts && is.null(agent$mask) &&
-    agent$importance == "none"
+  inherits(agent, "gym_agent_monte_carlo") &&
+    learns_whole(agent$mask, agent$exploring_starts, agent$importance)
+}
+
+# Whether Monte Carlo with these arguments needs nothing but the steps of whole episodes.
+learns_whole <- function(mask, exploring_starts, importance) {
+  is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")
 }
 
 # Whether the server's processes play whole episodes for a learner; asked once per training.

@@ -13,7 +13,7 @@ unequal_rules <- function(trainings) {
   by_env <- split(trainings, vapply(trainings, function(x) x$env_id, ""))
   unlist(lapply(unname(by_env), function(those) {
     rules <- lapply(those, function(x) {
-      one <- if (inherits(x, "gym_trainings")) x$trainings[[1L]] else x
+      one <- each_training(x)[[1L]]
       c(list(target = one$target %||% Inf), one$rules, environment_settings(one))
     })
     c(

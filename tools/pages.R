@@ -8,19 +8,19 @@ changed <- function() {
   !file.exists(contents) || any(file.mtime(sources) > file.mtime(contents))
 }
 
-# What it says is shown only when it fails.
+# The output is shown only if this fails.
 install_pages <- function() {
   folder <- tempfile("pages-")
   dir.create(folder)
   log <- tempfile("pages-log-")
-  r <- file.path(R.home("bin"), "Rscript")
-  steps <- 'source("tools/tarball.R"); folder <- commandArgs(TRUE)
-    tarball <- build_tarball(folder)
-    quit(status = r_cmd("INSTALL", "--no-lock", "--library=.r-library", shQuote(tarball)))'
-  status <- system2(r, c("--no-init-file", "-e", shQuote(steps), shQuote(folder)), log, log)
-  if (status != 0) {
+  status <- tryCatch(
+    r_cmd("INSTALL", "--no-lock", "--library=.r-library", shQuote(build_tarball(folder, log)),
+          output = log),
+    error = conditionMessage
+  )
+  if (!identical(status, 0L)) {
     writeLines(utils::tail(readLines(log), 40))
-    stop("The pages could not be built (see above).", call. = FALSE)
+    stop("The vignettes could not be built (see above).", call. = FALSE)
   }
   Sys.setFileTime(contents, Sys.time())
 }

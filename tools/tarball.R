@@ -1,7 +1,9 @@
 # Builds the package with its vignettes.
 
-r_cmd <- function(...) {
-  system2(file.path(R.home("bin"), "R"), c("CMD", ...), stdout = "", stderr = "", stdin = "")
+# `output` names the file for what the command prints; "" shows it.
+r_cmd <- function(..., output = "") {
+  r <- file.path(R.home("bin"), "R")
+  system2(r, c("CMD", ...), stdout = output, stderr = output, stdin = "")
 }
 
 # What R CMD build would copy before it drops it: the tools' own folders are left behind at once.
@@ -13,10 +15,10 @@ copy_of_checkout <- function(into) {
 }
 
 # Builds the checkout in `folder`; returns the tarball's path.
-build_tarball <- function(folder) {
+build_tarball <- function(folder, output = "") {
   copy_of_checkout(file.path(folder, "gym"))
   here <- setwd(folder)
   on.exit(setwd(here))
-  if (r_cmd("build", "gym") != 0) stop("R CMD build failed", call. = FALSE)
+  if (r_cmd("build", "gym", output = output) != 0) stop("R CMD build failed", call. = FALSE)
   file.path(folder, list.files(pattern = "^gym_.*[.]tar[.]gz$"))
 }

@@ -1,0 +1,104 @@
+# Checks the arguments of train_agent().
+
+check_training <- function(settings, call) {
+  check_environment(settings$env, "env", call)
+  check_trained_policy(settings$policy, settings$agent, call)
+  check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
+  check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
+  if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
+    gym_abort(
+      c(paste0("`seed` is one whole number, not ", length(settings$seed), " of them."),
+        i = "`seeds` trains once with each of several seeds."),
+      class = "gym_error_argument", argument = "seed", value = settings$seed, call = call
+    )
+  }
+  check_seed(settings$seed, arg = "seed", call = call)
+  for (name in c("iterations", "max_steps")) {
+    check_count(settings[[name]], allow_null = TRUE, arg = name, call = call)
+  }
+  for (name in c("episodes", "eval_every")) {
+    check_count(settings[[name]], arg = name, call = call)
+  }
+  check_count(
+    settings$eval_episodes_curve, min = 0, arg = "eval_episodes_curve", call = call
+  )
+  check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
+  if (is.null(settings$iterations) && is.null(settings$total_steps)) {
+    abort_no_budget(call = call)
+  }
+  if (!is.null(settings$callback) && !is.function(settings$callback)) {
+    abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
+  }
+  if (settings$search && !inherits(settings$agent, "gym_agent_random")) {
+    must <- "\"evaluation\" for this agent: only the policy of `agent_random()` is a candidate's"
+    abort_argument("candidate", must, "solved_by", call)
+  }
+}
+
+# Otherwise it would be taken for an argument of the environment.
+check_no_steps <- function(names, call) {
+  if ("steps" %in% names) {
+    gym_abort(
+      c("The budget in steps of the environment is the argument `total_steps`, not `steps`.",
+        i = "For an environment with an argument `steps`, call `gym_make()` first."),
+      class = "gym_error_argument", argument = "steps", call = call
+    )
+  }
+}
+
+# A misspelt argument would be taken for one of the environment. A name that only resembles another
+# may really be one: it is refused only if training cannot start anyway.
+check_spelling <- function(names, choices, can_begin, call) {
+  for (name in names) {
+    near <- nearest_name(name, choices)
+    if (length(near) && (plain_name(near) == plain_name(name) || !can_begin)) {
+      gym_abort(
+        c(paste0("There is no argument `", name, "`."), i = paste0("Did you mean `", near, "`?")),
+        class = "gym_error_argument", argument = name, call = call
+      )
+    }
+  }
+}
+
+abort_no_budget <- function(hints = NULL, call) {
+  gym_abort(
+    c("Training needs a budget: give `iterations`, or `total_steps` of the environment.", hints),
+    class = "gym_error_argument", argument = "iterations", call = call
+  )
+}
+
+check_trained_policy <- function(policy, agent, call) {
+  if (learns_online(agent)) {
+    if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
+      must <- "NULL, or a table of values made by `policy_table()`"
+      abort_argument(policy, must, "policy", call)
+    }
+  } else if (!inherits(policy, "gym_policy_network")) {
+    check_policy(policy, "policy", call)
+    abort_no_weights(policy, "policy", call)
+  }
+}
+
+check_agent <- function(agent, call) {
+  if (is.function(agent)) {
+    gym_abort(
+      c("`agent` must be an agent, not a function.",
+        i = "Did you forget the parentheses, as in `agent_ars()`?"),
+      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    )
+  }
+  if (!inherits(agent, "gym_agent")) {
+    gym_abort(
+      c(paste0("`agent` must be an agent made by a function such as `agent_ars()`, not ",
+               describe_argument(agent), "."),
+        i = if (is.character(agent)) {
+          paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",
+                 "`agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables ",
+                 "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`, ",
+                 "`agent_actor_critic()`. Others, such as SAC, are left to Stable-Baselines3 or ",
+                 "torch.")
+        }),
+      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    )
+  }
+}
