@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo bench test test-all soak check lint document site clean
+.PHONY: help demo bench test test-all soak check lint coverage document site clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -21,7 +21,9 @@ help:
 	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
 	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
-	@echo 'make lint      lintr and the order of the files for R; ruff, import-linter and mypy for Python'
+	@echo 'make lint      lintr and the order of the files for R; ruff, import-linter and mypy for Python;'
+	@echo '               spelling, by the word list inst/WORDLIST'
+	@echo 'make coverage  which lines make test runs, of both halves; ten minutes'
 	@echo 'make site      the site (pkgdown) in site/, its links checked; ten minutes'
 	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
 	@echo 'make clean     remove everything that these made'
@@ -59,6 +61,10 @@ check:
 lint:
 	@tools/setup lint
 	@tools/in-env tools/lint
+
+coverage:
+	@tools/setup coverage
+	@tools/in-env tools/coverage
 
 document:
 	@tools/setup document

@@ -33,7 +33,8 @@ goal_packages <- function(goal) {
     check = list(need = c(imports, "testthat", vignettes, "codetools"), want = optional),
     pages = list(need = imports, want = c(vignettes, "magick")),
     site = list(need = c(imports, vignettes, "pkgdown"), want = optional),
-    lint = list(need = c("lintr", "codetools")),
+    lint = list(need = c("lintr", "codetools", "spelling")),
+    coverage = list(need = c(imports, "testthat", "covr"), want = optional),
     document = list(need = c(imports, "roxygen2"))
   )
 }

@@ -38,6 +38,7 @@ places <- function(page) {
 
 # README.md and SECURITY.md link to the repository's files; the site has pages of them.
 link_to_pages <- function(text) {
+  text <- gsub('href="pkgdown/assets/', 'href="', text)
   text <- gsub('href="vignettes/(articles/)?([^"/]*)[.]Rmd"', 'href="articles/\\2.html"', text)
   gsub('href="NEWS[.](md|html)"', 'href="news/index.html"', text)
 }

@@ -50,6 +50,17 @@ test_that("the reference on the web names every help page", {
   expect_identical(setdiff(topics, known), character())
 })
 
+test_that("the site's menu names every article", {
+  lines <- readLines(source_tree("_pkgdown.yml"))
+  entries <- sub("^  - ", "", grep("^  - ", lines, value = TRUE))
+  starts <- sub("starts_with\\(\"(.*)\"\\)", "\\1", grep("^starts_with", entries, value = TRUE))
+  articles <- list.files(source_tree("vignettes"), "[.]Rmd$", recursive = TRUE)
+  expect_gt(length(articles), 15L)
+  for (article in sub("[.]Rmd$", "", articles)) {
+    expect_true(article %in% entries || any(startsWith(article, starts)), info = article)
+  }
+})
+
 test_that("texts name the tutorial, and do not take it for known as a post", {
   skip_unless_all()
   texts <- c(list.files(source_tree("man"), "[.]Rd$", full.names = TRUE),
