@@ -12,24 +12,23 @@ endif
 
 help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
-	@echo 'make bench     steps a second, beside reticulate, the classic client and Python itself;'
-	@echo '               half an hour, or a glance: make bench QUICK=1; PARTS="wire" runs that;'
-	@echo '               PARTS=gradients is PPO beside Stable-Baselines3, some hours'
-	@echo 'make test      the tests of the main promises: of the server (pytest) and of the R package'
+	@echo 'make bench     measure steps a second, and compare with reticulate, the classic client and'
+	@echo '               Python; half an hour. QUICK=1 is shorter, PARTS="wire" runs one part,'
+	@echo '               PARTS=gradients compares PPO with Stable-Baselines3 in some hours'
+	@echo 'make test      test the main promises: of the server (pytest) and of the R package'
 	@echo '               (testthat); three minutes'
-	@echo 'make test-all  every test of both'
-	@echo 'make soak      what takes long to prove: crowds, faults, fuzzing, half an hour of use; some'
-	@echo '               two hours, or a glance: make soak QUICK=1; PARTS="clients cuts" runs those'
+	@echo 'make test-all  run every test of both'
+	@echo 'make soak      run the long tests: crowds, faults, fuzzing, half an hour of use; two hours.'
+	@echo '               QUICK=1 is shorter, PARTS="clients cuts" runs two parts'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
-	@echo 'make lint      lintr and the order of the files for R; ruff, import-linter and mypy for Python;'
-	@echo '               spelling, by the word list inst/WORDLIST'
-	@echo 'make coverage  which lines make test runs, of both halves; ten minutes'
-	@echo 'make site      the site (pkgdown) in site/, its links checked; ten minutes'
-	@echo 'make document  man/ and NAMESPACE from the comments in R/ (roxygen2)'
+	@echo 'make lint      lint R (lintr, layers), Python (ruff, import-linter, mypy) and spelling'
+	@echo 'make coverage  list the files that make test reaches least, of both halves; ten minutes'
+	@echo 'make site      build the site (pkgdown) in site/ and check its links; ten minutes'
+	@echo 'make document  make man/ and NAMESPACE from the comments in R/ (roxygen2)'
 	@echo 'make clean     remove everything that these made'
 	@echo
-	@echo 'Each first installs what it lacks: R and Python themselves by apt on Debian and Ubuntu,'
-	@echo 'all the rest into .venv/ and .r-library/. GYM_PYTHON=... names another Python.'
+	@echo 'Each first installs what is missing: on Debian and Ubuntu R and Python by apt, everything'
+	@echo 'else into .venv/ and .r-library/. GYM_PYTHON=... names another Python.'
 
 demo:
 	@tools/setup demo

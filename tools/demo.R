@@ -22,7 +22,7 @@ for (attempt in 1:5) {
   if (result$solved) break
 }
 
-cat("100 fresh episodes with the network found:\n\n")
+cat("100 fresh episodes with this network:\n\n")
 print(summary(result))
 cat("\n")
 
@@ -38,4 +38,4 @@ if (moves) {
   pictures <- c(pictures, "The pole, moving" = normalizePath(film$file))
 }
 cat(sprintf("%s: %s\n", names(pictures), pictures), sep = "")
-cat("\nThe same again, in R:  search_random(seed = ", seed, ")\n", sep = "")
+cat("\nTo repeat this in R:  search_random(seed = ", seed, ")\n", sep = "")

@@ -54,7 +54,7 @@ make_hosts <- function() {
   made <- has_ip && all(vapply(hosts, make_host, NA))
   if (!made) {
     remove_hosts()
-    message("Network namespaces are not allowed here: the hosts are mere processes.")
+    message("Network namespaces are not allowed here, so the hosts are ordinary processes.")
   }
   made
 }

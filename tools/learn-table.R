@@ -17,7 +17,7 @@ todo <- do.call(rbind, lapply(learn_jobs[only], function(job) {
   data.frame(env_id = job$env_id, seed = 1000L + seq_len(job$seeds))
 }))
 todo <- todo[!key(todo) %in% key(read_rows()), ]
-cat(nrow(todo), "trainings to come\n")
+cat(nrow(todo), "trainings left\n")
 
 run_side_by_side(
   "tools/learn/train.R", Map(c, todo$env_id, todo$seed), as.integer(option("processes", "2")),

@@ -26,12 +26,12 @@ install_pages <- function() {
 }
 
 if (!requireNamespace("rmarkdown", quietly = TRUE) || !rmarkdown::pandoc_available()) {
-  cat("\nWith pandoc and the R packages knitr and rmarkdown, `make demo` builds the vignettes.\n")
+  cat("\nTo have `make demo` build the vignettes, install pandoc, knitr and rmarkdown.\n")
   quit()
 }
 if (changed()) {
-  cat("\nBuilding the vignettes, once: a minute or two.\n")
+  cat("\nBuilding the vignettes (once, a minute or two).\n")
   install_pages()
 }
-cat("\nWhere to go on: file://", contents, "\n", sep = "")
-cat("or, in R (tools/in-env R):  browseVignettes(\"gym\")\n")
+cat("\nTo read on, open file://", contents, "\n", sep = "")
+cat("or call in R (tools/in-env R):  browseVignettes(\"gym\")\n")

@@ -42,7 +42,7 @@ todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
 }))
 todo <- todo[todo$env_id %in% only & todo$method %in% methods, ]
 todo <- todo[!key(todo) %in% key(read_rows(table_file)), ]
-cat(nrow(todo), "trainings to come\n")
+cat(nrow(todo), "trainings left\n")
 
 run_side_by_side(
   "tools/solve/train.R", Map(c, todo$row, todo$seed), as.integer(option("processes", "2")),
