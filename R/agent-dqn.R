@@ -171,15 +171,16 @@ learn_from_memory <- function(agent, memory, updates, steps, settings) {
 dqn_update <- function(policy, state, rows, settings) {
   n <- length(rows$reward)
   values_after <- forward_network(policy, state$target, rows$next_inputs)$outputs
+  layers <- layers_of(policy, state$weights)
   best <- if (settings$double) {
-    own <- forward_network(policy, state$weights, rows$next_inputs)$outputs
+    own <- forward_layers(layers, policy$activation, rows$next_inputs)$outputs
     values_after[places_of_actions(nrow(own), max.col(t(own), "first"))]
   } else {
     column_max(values_after)
   }
   wanted <- rows$reward + settings$gamma * ifelse(rows$terminated, 0, best)
 
-  forward <- forward_network(policy, state$weights, rows$inputs)
+  forward <- forward_layers(layers, policy$activation, rows$inputs)
   outputs <- forward$outputs
   taken <- places_of_actions(nrow(outputs), rows$action)
   error <- outputs[taken] - wanted

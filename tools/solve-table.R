@@ -3,14 +3,16 @@
 # with the settings of agent_presets(), with seeds that no setting was tried on.
 #
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
-#     [methods=METHOD,...]
+#     [methods=METHOD,...] [seeds=N]
 #
-# It takes hours. What the tables have already is not trained again, so that it may be stopped at
-# any time; a row that is to be made anew is deleted from both first.
+# It takes hours. `seeds` trains only the first of each job. What the tables have already is not
+# trained again, so that it may be stopped at any time; a row that is to be made anew is deleted from
+# both first.
 source("tools/processes.R")
 source("tools/solve/jobs.R")
 
 only <- strsplit(option("only", paste(unique(solve_jobs$env_id), collapse = ",")), ",")[[1L]]
+most_seeds <- as.integer(option("seeds", max(solve_jobs$seeds)))
 methods <- strsplit(option("methods", paste(unique(solve_jobs$method), collapse = ",")), ",")[[1L]]
 
 table_file <- "inst/extdata/solve-table.csv.gz"
@@ -37,7 +39,7 @@ todo <- do.call(rbind, lapply(seq_len(nrow(solve_jobs)), function(row) {
   job <- solve_jobs[row, ]
   data.frame(
     row = row, env_id = job$env_id, kwargs = job$kwargs, method = job$method,
-    seed = first_seed(job) + seq_len(job$seeds) - 1L
+    seed = first_seed(job) + seq_len(min(job$seeds, most_seeds)) - 1L
   )
 }))
 todo <- todo[todo$env_id %in% only & todo$method %in% methods, ]
