@@ -9,8 +9,9 @@
 #'
 #' Before the first iteration and then every `eval_every` iterations, the agent's own policy plays
 #' `eval_episodes_curve` episodes for the learning curve. If their mean return, or that of the
-#' candidates, reaches the target, the policy plays `eval_episodes` new episodes, which decide
-#' whether training ends. This may happen several times, so training tends to end when the policy
+#' iteration's episodes, reaches the target, the policy plays `eval_episodes` new episodes, which
+#' decide whether training ends. (The iterations of [agent_dqn()] are single episodes; the mean of
+#' the last eight counts.) This may happen several times, so training tends to end when the policy
 #' was lucky. At the end the policy therefore plays `eval_episodes` further episodes, with seeds
 #' that were never used before. Their mean return is the result of the training. Evaluations do not
 #' count as steps of the training.

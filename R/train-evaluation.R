@@ -22,10 +22,10 @@ training_target <- function(settings, spec) {
 #' ones were not played. Otherwise an evaluation decides.
 #' @noRd
 training_ends <- function(state, vector_env, settings) {
-  reached <- reaches(state$history[[state$iteration]]$mean_return, settings$target)
   if (settings$search) {
-    return(state$solved <- reached)
+    return(state$solved <- reaches(state$history[[state$iteration]]$mean_return, settings$target))
   }
+  reached <- reaches(recent_return(state), settings$target)
   if (!reached && state$iteration %% settings$eval_every == 0) {
     curve <- evaluate_for_curve(state, vector_env, settings)
     reached <- reaches(curve$mean_return, settings$target)
@@ -35,6 +35,25 @@ training_ends <- function(state, vector_env, settings) {
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
+}
+
+# An iteration of DQN is a single episode, and one that was lucky does not justify an evaluation of
+# 100. An agent that gets trajectories is therefore judged by its last iterations with at least this
+# many episodes, the fewest that PPO plays in one.
+enough_episodes <- 8L
+
+recent_return <- function(state) {
+  if (learns_online(state$agent) || !"trajectories" %in% agent_needs(state$agent)) {
+    return(state$history[[state$iteration]]$mean_return)
+  }
+  recent <- utils::tail(state$history, enough_episodes)
+  of <- function(name) vapply(recent, `[[`, 0, name)
+  before <- state$iteration - length(recent)
+  steps <- diff(c(if (before) state$history[[before]]$steps else 0, of("steps")))
+  episodes <- round(steps / of("mean_length"))
+  later <- rev(cumsum(rev(episodes))) - episodes
+  counts <- later < enough_episodes
+  stats::weighted.mean(of("mean_return")[counts], episodes[counts])
 }
 
 # The untrained policy, if its episodes are sure to end.

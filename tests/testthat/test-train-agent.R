@@ -79,6 +79,20 @@ test_that("a checkpoint from before the first iteration goes on to the same eval
   }
 })
 
+test_that("one lucky episode of an agent that gets trajectories leads to no evaluation", {
+  # Iterations of so many episodes of ten steps, the last one first.
+  judged <- function(agent, episodes, returns) {
+    steps <- cumsum(rev(episodes)) * 10
+    history <- Map(history_row, seq_along(steps), steps, rev(returns), 10, 1)
+    recent_return(list(agent = agent, history = history, iteration = length(history)))
+  }
+  expect_equal(judged(agent_dqn(), rep(1, 20), c(500, rep(20, 7), rep(0, 12))), 80)
+  expect_equal(judged(agent_dqn(), c(2, 5, 3, 9), c(10, 40, 20, 999)), 28)
+  expect_equal(judged(agent_dqn(), c(1, 1), c(30, 10)), 20)
+  expect_equal(judged(agent_ppo(), c(8, 8), c(30, 10)), 30)
+  expect_equal(judged(agent_hill_climb(), c(1, 1), c(30, 10)), 30)
+})
+
 test_that("fresh episodes decide whether a training ends, and further ones what it has come to", {
   lucky <- function(seed, step, action) if (seed <= 2^30) 10 else 1
   trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,
