@@ -32,7 +32,7 @@ goal_packages <- function(goal) {
     test = list(need = c(imports, "testthat"), want = optional),
     check = list(need = c(imports, "testthat", vignettes, "codetools"), want = optional),
     pages = list(need = imports, want = c(vignettes, "magick")),
-    site = list(need = c(imports, vignettes, "pkgdown"), want = optional),
+    site = list(need = c(imports, vignettes, "pkgdown", "dplyr"), want = optional),
     lint = list(need = c("lintr", "codetools", "spelling")),
     coverage = list(need = c(imports, "testthat", "covr"), want = optional),
     document = list(need = c(imports, "roxygen2"))
