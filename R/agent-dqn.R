@@ -42,8 +42,8 @@
 #'   is 1.
 #' @param min_episodes The smallest number of episodes in an iteration. The default is 1.
 #' @inheritParams agent_ars
-#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described
-#'   above.
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described in
+#'   the details.
 #' @return `agent_dqn()` returns an agent of class `gym_agent_dqn`. `learn_dqn()` makes this agent,
 #'   trains it and returns the result of [train_agent()]. For each iteration its history and the log
 #'   have `loss`, `n_updates`, `exploration_rate` and `learning_rate`.

@@ -54,8 +54,8 @@
 #'   played (an estimate of the Kullback-Leibler divergence).
 #' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars
-#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described
-#'   above.
+#' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described in
+#'   the details.
 #' @return `agent_ppo()` returns an agent of class `gym_agent_ppo`. `learn_ppo()` makes this agent,
 #'   trains it and returns the result of [train_agent()]. For each iteration its history and the log
 #'   have `approx_kl`, `clip_fraction`, `entropy_loss`, `explained_variance`, `loss`,

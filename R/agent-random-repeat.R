@@ -30,7 +30,7 @@
 #' @param target The mean return of a round that ends a search, a number. `NULL`, the default, uses
 #'   the environment's reward threshold. Give a target if it has none.
 #' @param seeds The seeds, different whole numbers. The default is 1 to 100. With CartPole each
-#'   takes about a third of a second.
+#'   takes less than a tenth of a second.
 #' @return An object of class `gym_searches`, with methods for [print()], [summary()],
 #'   [as.data.frame()] and [plot()][plot.gym_searches()]. It is a list with the elements
 #'   \describe{

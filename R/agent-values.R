@@ -316,6 +316,7 @@ weights_policy <- function(agent, columns) {
 
 #' Get the learned values
 #'
+#' Return the values in the table (or by the features) of an agent that learned them.
 #' @param x The result of `learn_q()` and the like, or their agent.
 #' @param actions Return the value of each action? `FALSE`, the default, or `TRUE`.
 #' @return For Discrete observations, a numeric vector with an element for each state, named by its

@@ -19,7 +19,7 @@
 #' @param num_envs The number of sub-environments to make, a whole number of at least 1. `NULL`, the
 #'   default, chooses. An environment that was made before keeps its number.
 #' @param num_workers The number of processes that run the sub-environments, a whole number: 0 for
-#'   none but the server itself. `NULL`, the default, lets the server choose, and uses none for
+#'   the server's own process. `NULL`, the default, lets the server choose, and uses none for
 #'   fewer than 32 episodes (`max_envs`). The result does not depend on it. Only if the environment
 #'   is given by its id and has no vector implementation of its own.
 #' @param ... Arguments of the environment, by name, if it is given by its id.

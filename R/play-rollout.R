@@ -74,17 +74,17 @@
 #' @param ... Arguments of the environment, by name, such as `is_slippery = FALSE` for FrozenLake,
 #'   if it is given by its id.
 #' @param num_envs The number of sub-environments, a whole number, if the environment is given by
-#'   its id. Beside the environment, the column `sub_env` and arrays distribute the episodes over so
-#'   many. `NULL`, the default, chooses, see [as_vector_env()].
+#'   its id. If the server plays whole episodes, it only numbers them in the column `sub_env` and
+#'   shapes the arrays. `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step, in columns whose names begin with
 #'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only with `steps`. At the
 #'   end of an episode it is that episode's last observation.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_workers The number of the server's processes that run the sub-environments if R plays
-#'   step by step, a whole number; 0 for none but the server itself. The result does not depend on
-#'   it. `NULL`, the default, lets the server choose, see [as_vector_env()]. Only if the environment
-#'   is given by its id and has no vector implementation of its own, as CartPole has. Beside the
-#'   environment the server always chooses.
+#'   step by step, a whole number; 0 for the server's own process. The result does not depend on it.
+#'   `NULL`, the default, lets the server choose, see [as_vector_env()]. Only if the environment is
+#'   given by its id and has no vector implementation of its own, as CartPole has. If the server
+#'   plays whole episodes, it always chooses.
 #' @return An object of class `gym_rollout`, with methods for [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()]. It is a list with the elements
 #'   \describe{
@@ -129,7 +129,7 @@
 #' random
 #' summary(random)
 #'
-#' # Any function of a matrix of observations can be a policy, and each step be kept.
+#' # Any function of a matrix of observations can be a policy. Each step can be kept.
 #' follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 #' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
 #' head(as.data.frame(played))
@@ -145,13 +145,13 @@
 #' }
 #' from_here[1, ]
 #'
-#' # The second episode begins again.
+#' # Start the second episode again.
 #' second <- played$episodes[2, ]
 #' env <- gym_make("CartPole-v1", num_envs = played$num_envs)
 #' env$reset(seed = second$seed)[second$sub_env, ]
 #' env$close()
 #'
-#' # Where each episode has a seed of its own, a single environment will do.
+#' # If each episode has its own seed, a single environment is enough.
 #' lake <- rollout("FrozenLake-v1", policy_random(), episodes = 2, seed = 1)
 #' env <- gym_make("FrozenLake-v1")
 #' env$reset(seed = lake$episodes$seed[2])
@@ -315,6 +315,7 @@ returns_text <- function(returns) {
 
 #' Summarise a rollout
 #'
+#' Count the episodes and steps of a rollout, and summarise their returns and lengths.
 #' @param object The result of [rollout()].
 #' @param ... Not used.
 #' @return An object of class `summary.gym_rollout`, a list with the elements `env_id` (a string),

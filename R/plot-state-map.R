@@ -19,7 +19,7 @@
 #' @param type What to show, a string: `"actions"`, the default, or `"q"`, the values of all
 #'   actions.
 #' @return A ggplot. `plot()` returns it invisibly.
-#' @section Errors: `gym_error_argument` if `type` is `"q"` and the policy is no table.
+#' @section Errors: `gym_error_argument` if `type` is `"q"` and the policy is not a table.
 #' @rdname plot.gym_state_map
 #' @exportS3Method ggplot2::autoplot
 #' @examples

@@ -62,7 +62,7 @@
 #'   the last column is the bias. `NULL`, the default, draws them.
 #' @param bias Does each neuron have a bias, a number added to its sum? `FALSE`, the default, or
 #'   `TRUE`.
-#' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`, see below.
+#' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`, see [policy_network()].
 #' @param output How the outputs determine an action, a string: `"greedy"`, the default,
 #'   `"softmax"`, `"gaussian"` or `"epsilon-greedy"`, see below. `NA` depends on the environment:
 #'   softmax for a Discrete action space, gaussian for a Box.
