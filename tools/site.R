@@ -1,6 +1,9 @@
 # Builds the site into site/, with no network and no server but the one that the articles start, and
 # checks that what its pages link to in the site is there.
 options(pkgdown.internet = FALSE)
+# What CRAN knows of packages that an article names and that are not installed, such as torch.
+no_packages <- function() data.frame(Package = character(), URL = character())
+utils::assignInNamespace("CRAN_urls", no_packages, "downlit")
 folder <- "site"
 
 # Where a page's links lead: files of the site, each with the place in it, if one is named.
@@ -47,6 +50,8 @@ link_to_pages <- function(text) {
 without_network <- function(text) {
   text <- gsub('<script src="(https?:|file:)[^>]*></script>', "", text)
   text <- gsub('<link rel="stylesheet" href="https?:[^>]*>', "", text)
+  # There is no logo.
+  text <- gsub('<img src="" class="logo"[^>]*>', "", text)
   sub('<script src="((../)*)pkgdown[.]js"></script>', '<script src="\\1search.js"></script>', text)
 }
 
