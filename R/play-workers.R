@@ -46,7 +46,7 @@
 #'   or of Gymnasium; the field `host` names the worker's machine. An error on a worker is the
 #'   call's own error, with the field `host`.
 #' @references H. Bengtsson (2021): A Unifying Framework for Parallel and Distributed Processing in
-#'   R using Futures. The R Journal 13(2), <https://doi.org/10.32614/RJ-2021-048>.
+#'   R using Futures. The R Journal 13(2), \doi{10.32614/RJ-2021-048}.
 #' @seealso `vignette("scaling")`; `system.file("examples/slurm.R", package = "gym")`, for a cluster
 #'   with a queue.
 #' @name workers
