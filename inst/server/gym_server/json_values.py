@@ -39,7 +39,7 @@ def plain(value: object, depth: int = 0) -> object:
         return plain(value.tolist(), depth) if value.dtype != object else _array(value, depth)
     if isinstance(value, (np.bool_, np.integer)):
         return value.item()
-    if isinstance(value, Mapping):
+    if isinstance(value, (dict, Mapping)):
         return {_key(key): plain(item, depth + 1) for key, item in value.items()}
     if isinstance(value, Iterable) and not isinstance(value, (bytes, bytearray, memoryview)):
         return _items(value, depth)

@@ -60,7 +60,10 @@ class Endpoint:
         route = self._route
         fields: dict = {}
         try:
-            raw = self._body(environ)
+            length = int(environ.get("CONTENT_LENGTH") or 0)
+            if length > self._max_body_bytes:
+                raise body_too_large()
+            raw = environ["wsgi.input"].read(length)
             tensors = route.tensor_body if TENSORS in environ.get("CONTENT_TYPE", "") else None
             body = _query(environ) if route.method == "GET" else (tensors or bodies.loads)(raw)
             read(body, self._fields, fields)
@@ -73,7 +76,9 @@ class Endpoint:
             match.variables,
             body,
             fields,
-            _wanted_form(accept, route.content_type) if route.tensors else JSON_FORM,
+            (_FORMS.get(accept) or _wanted_form(accept, route.content_type))
+            if route.tensors
+            else JSON_FORM,
             match.path,
             accept,
             environ.get(IS_CONNECTED, _always),
@@ -105,13 +110,6 @@ class Endpoint:
             # store.
             did_nothing = isinstance(error, GymServerError) and error.did_nothing
             return Outcome(failure(error, request_id), not did_nothing, instance_id)
-
-    def _body(self, environ: dict) -> bytes:
-        length = int(environ.get("CONTENT_LENGTH") or 0)
-        if length > self._max_body_bytes:
-            raise body_too_large()
-        body: bytes = environ["wsgi.input"].read(length)
-        return body
 
 
 def failure(error: BaseException, request_id: RequestId | None = None) -> Response:
@@ -146,9 +144,6 @@ _FORMS = {
 
 
 def _wanted_form(accept: str, content_type: str) -> AnswerForm:
-    form = _FORMS.get(accept)
-    if form is not None:
-        return form
     if TENSORS not in accept:
         return JSON_FORM
     accepted = parse_accept_header(accept, MIMEAccept)

@@ -7,8 +7,8 @@ from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.protocol.answers import Ready, frame_tensor
-from gym_server.protocol.bodies import loads_tensors
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
+from gym_server.protocol.known_headers import loads_tensors
 from gym_server.rendering.png import png
 from gym_server.response import Response
 

@@ -33,13 +33,6 @@ from gym_server.threads.in_progress import InProgress
 _SHARE_LEFT = 7 / 8
 
 
-class _Doing(NamedTuple):
-    """A request in progress."""
-
-    thread: int
-    request_id: RequestId
-
-
 class Outcome(NamedTuple):
     """The outcome of a request.
 
@@ -122,8 +115,8 @@ class ExactlyOnce:
         self._table: dict[str | None, dict[Hashable, _Row]] = {}
         self._bytes = 0
         self._rows_since_sweep = 0
-        # The requests in progress, each with its row and contents.
-        self._doing: InProgress[_Doing, tuple[_Row, Hashable, int]] = InProgress()
+        # The requests in progress by row: the thread, and what is stored with the response.
+        self._doing: InProgress[_Row, tuple[int, RequestId, Hashable, int]] = InProgress()
 
     def respond(
         self,
@@ -148,19 +141,19 @@ class ExactlyOnce:
                 smaller than the newest, or its response was dropped; ``too_many_keys``.
         """
         row = self._acquire(request_id, instance_id)
-        doing = _Doing(threading.get_ident(), request_id)
-        self._doing.begin(doing, (row, content, size))
+        self._doing[row] = threading.get_ident(), request_id, content, size
+        outcome = None
         try:
             if request_id.number <= row.number:
                 return _repeat(row, request_id, content)
             outcome = act()
-            if outcome.did_something and self._doing.finish(doing):
-                row.instance_id = outcome.instance_id
-                self._store(row, request_id, content, size, outcome.response)
             return outcome.response
         finally:
-            if self._doing.finish(doing):
-                if row.number < 0:
+            if self._doing.finish(row):
+                if outcome is not None and outcome.did_something:
+                    row.instance_id = outcome.instance_id
+                    self._store(row, request_id, content, size, outcome.response)
+                elif row.number < 0:
                     with self._lock:
                         self._drop(row)
                 row.lock.release()
@@ -178,11 +171,12 @@ class ExactlyOnce:
         Returns:
             The response; None if the thread is not doing a request with an idempotency key.
         """
-        for doing, (row, content, size) in self._doing.items():
-            if doing.thread == thread and self._doing.abandon(doing):
-                response = refuse(doing.request_id)
-                self._store(row, doing.request_id, content, size, response)
-                self._doing.answered(doing)
+        for row, (worker, request_id, content, size) in list(self._doing.items()):
+            if worker == thread and self._doing.abandon(row):
+                response = refuse(request_id)
+                self._store(row, request_id, content, size, response)
+                row.lock.release()
+                self._doing.answered(row)
                 return response
         return None
 
@@ -205,7 +199,7 @@ class ExactlyOnce:
     def _store(
         self, row: _Row, request_id: RequestId, content: Hashable, size: int, response: Response
     ) -> None:
-        """Store a response in a row, and release its lock."""
+        """Store a response in a row; the caller holds its lock."""
         size += len(response.body)
         with self._lock:
             row.kept = content, response
@@ -215,7 +209,6 @@ class ExactlyOnce:
             row.size = size
             if self._bytes > self._most_bytes:
                 self._drop_largest()
-        row.lock.release()
 
     # With the table's lock ------------------------------------------------------------------
 

@@ -8,8 +8,9 @@ from typing import Any
 from gym_server import __version__
 from gym_server.api.routing import Route
 from gym_server.protocol.answers import HTML
-from gym_server.protocol.bodies import loads_file, loads_tensors
+from gym_server.protocol.bodies import loads_file
 from gym_server.protocol.fields import REQUEST, Field
+from gym_server.protocol.known_headers import loads_tensors
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 from gym_server.response import JSON
 

@@ -32,7 +32,8 @@ def checked_info(info: Any) -> Any:
     Raises:
         GymServerError: ``environment_error``.
     """
-    if isinstance(info, Mapping):
+    # A dict first: checking for other mappings takes longer.
+    if isinstance(info, (dict, Mapping)):
         return info
     raise GymServerError(
         "environment_error",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gymnasium.spaces import Discrete, Space
+from gymnasium.vector.utils import batch_space
 
 from gym_server import spaces
 from gym_server.errors import GymServerError
@@ -14,7 +15,7 @@ _CLIP = (
 
 
 class ActionReader:
-    """Reads the actions of one space.
+    """Reads the actions of one space, from JSON or tensors.
 
     As in Gymnasium, the bounds of a Box are left to the environment. All other requirements of the
     space are checked.
@@ -28,8 +29,10 @@ class ActionReader:
             num_envs: the number of sub-environments; None for a single environment.
         """
         self._space = space
+        self._wide = wide = spaces.with_wide_boxes(space)
         self._all = spaces.Rows(num_envs, f"the {num_envs} sub-environments")
-        self._taken = _Reader(spaces.with_wide_boxes(space))
+        self._of_json = spaces.json_reader(wide)
+        self._of_tensors = spaces.tensor_reader(wide, "action")
 
     def read(self, action: object, rows: int | None = None) -> object:
         """Decode an action, or with sub-environments a batch of actions.
@@ -41,42 +44,35 @@ class ActionReader:
         Raises:
             GymServerError: ``action_not_in_space``.
         """
+        whose = self._all if rows is None else self._rows(rows)
         try:
-            return self._taken.read(action, self._all if rows is None else self._rows(rows))
+            if isinstance(action, spaces.Parts):
+                return self._of_tensors(action, whose)
+            if whose.number is None:
+                return self._of_json(action)
+            return spaces.decode_sub_envs(self._wide, action, whose)
         except spaces.NotInSpace as refusal:
             raise GymServerError(
                 "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)
             ) from None
 
-    def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
-        """Add a hint to an environment's error if the action was outside its Box."""
-        if failure.code != "environment_error":
-            return
-        try:
-            _Reader(self._space).read(action, self._all if rows is None else self._rows(rows))
-        except spaces.NotInSpace:
-            failure.hint = _CLIP
-
-    def _rows(self, rows: int | None) -> spaces.Rows:
+    def _rows(self, rows: int) -> spaces.Rows:
         if rows == self._all.number:
             return self._all
         return spaces.Rows(rows, f"the {rows} sub-environments that step")
 
+    def explain(self, failure: GymServerError, action: object, rows: int | None = None) -> None:
+        """Add a hint to an environment's error if the action was outside its Box.
 
-class _Reader:
-    """Reads the actions of a space from JSON or tensors."""
-
-    def __init__(self, space: Space) -> None:
-        self._space = space
-        self._of_json = spaces.json_reader(space)
-        self._of_tensors = spaces.tensor_reader(space, "action")
-
-    def read(self, action: object, rows: spaces.Rows) -> object:
-        if isinstance(action, spaces.Parts):
-            return self._of_tensors(action, rows)
-        if rows.number is None:
-            return self._of_json(action)
-        return spaces.decode_sub_envs(self._space, action, rows)
+        Args:
+            failure: the error.
+            action: the action as ``read()`` returned it.
+            rows: as for ``read()``.
+        """
+        number = rows or self._all.number
+        space = self._space if number is None else batch_space(self._space, number)
+        if failure.code == "environment_error" and not space.contains(action):
+            failure.hint = _CLIP
 
 
 def _possible_actions(space: Space) -> str | None:

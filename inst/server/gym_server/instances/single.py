@@ -63,7 +63,7 @@ class SingleInstance(LocalInstance):
         try:
             return call_env(self._step_env, decoded, form)
         except GymServerError as failure:
-            self._actions.explain(failure, action)
+            self._actions.explain(failure, decoded)
             raise
 
     def _step_env(self, action: object, form: AnswerForm) -> dict:

@@ -140,7 +140,7 @@ class VectorInstance(LocalInstance):
         except GymServerError as failure:
             # Some sub-environments may have taken the step, and others not.
             self._was_reset = False
-            self._actions.explain(failure, action, rows)
+            self._actions.explain(failure, decoded, rows)
             raise
 
     def _select(self, mask: np.ndarray) -> np.ndarray:

@@ -183,7 +183,7 @@ class InstanceManager:
             creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
             instances = len(self._instances) + len(self._creating)
             self._limits.check_room(instances, taken, room)
-            self._creating.begin(creation, threading.get_ident())
+            self._creating[creation] = threading.get_ident()
             self._taken[creation] = creation.taken
         try:
             yield creation
@@ -346,7 +346,7 @@ class InstanceManager:
             # The thread waits for this answer, so it has not moved on to other work.
             interrupt(stuck)
 
-        for creation, thread in self._creating.items():
+        for creation, thread in list(self._creating.items()):
             began = self._renderer.began(thread) or creation.began
             if began < before and self._creating.abandon(creation):
                 why = creation.too_long(seconds)

@@ -118,8 +118,7 @@ class Watchers:
     def __init__(self, most: int) -> None:
         """Set how many may wait at a time."""
         self._most = most
-        self._lock = threading.Lock()
-        self._count = 0
+        self._free = threading.Semaphore(most)
 
     @contextlib.contextmanager
     def one_more(self) -> Iterator[None]:
@@ -128,16 +127,13 @@ class Watchers:
         Raises:
             GymServerError: ``too_many_watchers``.
         """
-        with self._lock:
-            if self._count >= self._most:
-                raise GymServerError(
-                    "too_many_watchers",
-                    f"This server shows environments to {self._most} watchers, the most it allows",
-                    "close a page; the server's option --max-watchers sets the limit",
-                )
-            self._count += 1
+        if not self._free.acquire(blocking=False):
+            raise GymServerError(
+                "too_many_watchers",
+                f"This server shows environments to {self._most} watchers, the most it allows",
+                "close a page; the server's option --max-watchers sets the limit",
+            )
         try:
             yield
         finally:
-            with self._lock:
-                self._count -= 1
+            self._free.release()

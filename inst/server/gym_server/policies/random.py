@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box, Dict, Discrete, Graph, OneOf, Sequence, Space, Tuple
+from gymnasium.spaces import Box, Discrete, Space
 from gymnasium.vector.utils import batch_space
 from numpy.random import Generator
 
@@ -17,7 +17,7 @@ from gym_server.json_values import brief
 from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.draws import Draws
 from gym_server.policies.reading import check_fields
-from gym_server.spaces import brief_space
+from gym_server.spaces import brief_space, parts_of
 
 
 @dataclass(frozen=True)
@@ -110,15 +110,4 @@ def _one_by_one(space: Space) -> Draws:
 
 def _with_parts(space: Space) -> list[Space]:
     """Return a space and all spaces in it, which share one generator."""
-    match space:
-        case Dict():
-            parts = list(space.spaces.values())
-        case Tuple() | OneOf():
-            parts = list(space.spaces)
-        case Sequence():
-            parts = [space.feature_space]
-        case Graph():
-            parts = [part for part in (space.node_space, space.edge_space) if part is not None]
-        case _:
-            parts = []
-    return [space, *(inner for part in parts for inner in _with_parts(part))]
+    return [space, *(inner for part in parts_of(space) for inner in _with_parts(part))]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 from gym_server.errors import GymServerError
-from gym_server.protocol import known_headers
 from gym_server.protocol.safetensors import Parts, malformed_tensors
 from gym_server.protocol.safetensors import read as read_tensors
 
@@ -55,7 +54,7 @@ def loads(raw: bytes) -> dict:
     return body
 
 
-def loads_tensors(raw: bytes) -> dict:
+def parse_tensors(raw: bytes) -> dict:
     """Return the fields of a request whose body is a safetensors file.
 
     Args:
@@ -67,10 +66,6 @@ def loads_tensors(raw: bytes) -> dict:
     Raises:
         GymServerError: ``malformed_tensors``.
     """
-    return known_headers.read(raw, _parse_tensors)
-
-
-def _parse_tensors(raw: bytes) -> dict:
     file = read_tensors(raw)
     body = {
         name: _json_text(name, text)

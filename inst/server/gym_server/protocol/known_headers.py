@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable
 from typing import NamedTuple
 
+from gym_server.protocol.bodies import parse_tensors
 from gym_server.protocol.safetensors import Parts, Tensor
 
 # The number in JSON inside a JSON string. A number is always written in the same way.
@@ -76,22 +76,17 @@ class _Memory(threading.local):
 _memory = _Memory()
 
 
-def read(raw: bytes, parse: Callable[[bytes], dict]) -> dict:
-    """Return the fields of a body of tensors.
-
-    Args:
-        raw: the body.
-        parse: reads a body with any header, and raises if it is malformed.
-    """
+def loads_tensors(raw: bytes) -> dict:
+    """Return the fields of a body of tensors; see ``parse_tensors()``."""
     known = _memory.known
     body = known.read(raw) if known is not None else None
     if body is None:
-        body = parse(raw)
-        _learn(raw, body, parse)
+        body = parse_tensors(raw)
+        _learn(raw, body)
     return body
 
 
-def _learn(raw: bytes, body: dict, parse: Callable[[bytes], dict]) -> None:
+def _learn(raw: bytes, body: dict) -> None:
     begin = 8 + int.from_bytes(raw[:8], "little")
     header = raw[:begin]
     found = list(_NUMBER.finditer(header)) if begin <= _LONGEST else []
@@ -101,16 +96,10 @@ def _learn(raw: bytes, body: dict, parse: Callable[[bytes], dict]) -> None:
     start, stop = found[0].span(1)
     _memory.seen = header[:start], header[stop:].rstrip(b" ")
     if seen == _memory.seen:
-        _memory.known = _known(raw, body, (start, stop), begin, parse)
+        _memory.known = _known(raw, body, (start, stop), begin)
 
 
-def _known(
-    raw: bytes,
-    body: dict,
-    digits: tuple[int, int],
-    begin: int,
-    parse: Callable[[bytes], dict],
-) -> KnownHeader | None:
+def _known(raw: bytes, body: dict, digits: tuple[int, int], begin: int) -> KnownHeader | None:
     """Return the header of a body; None if the digits affect more than the request's number.
 
     Args:
@@ -118,7 +107,6 @@ def _known(
         body: its fields.
         digits: where the digits begin and end.
         begin: where the data begin.
-        parse: as for ``read()``.
     """
     action, request = body.get("action"), body.get("request")
     if not isinstance(action, Parts) or not isinstance(request, dict):
@@ -134,7 +122,7 @@ def _known(
     start, stop = digits
     number = (int(raw[start:stop]) + 1) % 10
     header = raw[8:start] + b"%d" % number + raw[stop:begin]
-    other = parse(len(header).to_bytes(8, "little") + header + raw[begin:])
+    other = parse_tensors(len(header).to_bytes(8, "little") + header + raw[begin:])
     if other != {**body, "request": {**request, "number": number}}:
         return None
     fields = {name: value for name, value in body.items() if name not in ("action", "request")}

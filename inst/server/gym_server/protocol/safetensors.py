@@ -45,11 +45,6 @@ _DTYPES = {name: np.dtype(code).newbyteorder("<") for code, name in _NAMES.items
 _NATIVE = {name: np.dtype(code) for code, name in _NAMES.items()}
 
 
-def has_tensor(dtype: np.dtype) -> bool:
-    """Return whether the format has a name for a dtype."""
-    return dtype.str[1:] in _NAMES
-
-
 def tensor_name(dtype: np.dtype) -> str:
     """Return the format's name for a supported dtype."""
     return _NAMES[dtype.str[1:]]
@@ -67,7 +62,7 @@ class Tensor(NamedTuple):
         """Copy an array.
 
         Args:
-            array: an array with a dtype that ``has_tensor()`` accepts.
+            array: the array. KeyError is raised if the format has no name for its dtype.
             by_column: whether to transpose it, see ``COLUMN_TENSORS``.
         """
         dtype = array.dtype

@@ -130,7 +130,7 @@ class RenderThread:
         job.began = time.monotonic()
         if not job.future.set_running_or_notify_cancel():
             return True
-        self._in_progress.begin(job, None)
+        self._in_progress[job] = None
         try:
             result = job.draw()
         except BaseException as error:

@@ -107,21 +107,19 @@ class Bounds:
         least, most = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
         return bool(least >= low and most <= high)
 
+    def refusal(self, space: object, array: np.ndarray) -> NotInSpace:
+        """Return the error, with the index, for the first element outside the bounds, or NaN."""
+        inside = (array >= self.low) & (array <= self.high)
+        first = tuple(int(index) for index in np.argwhere(~inside)[0])
+        refusal = NotInSpace(space, array[first].item())
+        refusal.path[:] = first
+        return refusal
+
 
 @singledispatch
 def bounds_of(space: object) -> Bounds:
     """Return the bounds of a space of arrays. They apply to batches too."""
     raise TypeError(f"no bounds for {type(space).__name__}")
-
-
-def check_bounds(space: object, bounds: Bounds, array: np.ndarray) -> None:
-    """Raise NotInSpace, with the index, for the first element outside the bounds, or NaN."""
-    if not bounds.hold(array):
-        inside = (array >= bounds.low) & (array <= bounds.high)
-        first = tuple(int(index) for index in np.argwhere(~inside)[0])
-        refusal = NotInSpace(space, array[first].item())
-        refusal.path[:] = first
-        raise refusal
 
 
 def read_array(
@@ -145,17 +143,17 @@ def read_array(
         array = _array(space, read_element, nested)
     except (TypeError, ValueError, OverflowError):
         raise _refusal(space, read_element, value) from None
-    try:
-        check_bounds(space, bounds, array.reshape(space.shape))
-    except NotInSpace as refusal:
-        if is_bare:
-            refusal.path.clear()
-        elif array.shape != space.shape:
-            # The client sent a flat list, so the path must be an index into it.
-            index: tuple[Any, ...] = tuple(refusal.path)
-            refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
-        raise
-    return array.reshape(space.shape)
+    member = array.reshape(space.shape)
+    if bounds.hold(member):
+        return member
+    refusal = bounds.refusal(space, member)
+    if is_bare:
+        refusal.path.clear()
+    elif array.shape != space.shape:
+        # The client sent a flat list, so the path must be an index into it.
+        index: tuple[Any, ...] = tuple(refusal.path)
+        refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
+    raise refusal
 
 
 def _array(space: ArraySpace, read_element: Callable, nested: object) -> np.ndarray:

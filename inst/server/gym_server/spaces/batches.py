@@ -16,7 +16,6 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Sp
 
 from gym_server.spaces.arrays import (
     bounds_of,
-    check_bounds,
     choice_reader_of,
     read_array,
     read_bit,
@@ -94,7 +93,8 @@ def _all_at_once(space: Any, value: list) -> np.ndarray:
     if not set(map(type, value)) <= {int, bool}:
         raise TypeError("not only integers")
     array = np.array(value, dtype=wide_dtype(space))
-    check_bounds(space, bounds_of(space), array)
+    if not bounds_of(space).hold(array):
+        raise ValueError("out of bounds")
     return array.astype(space.dtype)
 
 

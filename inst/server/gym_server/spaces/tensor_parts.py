@@ -26,8 +26,8 @@ from gymnasium.spaces import (
     Tuple,
 )
 
-from gym_server.protocol.safetensors import Parts, Tensor, has_tensor, tensor_name
-from gym_server.spaces.arrays import bounds_of, check_bounds
+from gym_server.protocol.safetensors import Parts, Tensor, tensor_name
+from gym_server.spaces.arrays import bounds_of
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode, encode
 from gym_server.spaces.stacking import ARRAYS
@@ -129,9 +129,11 @@ def _(space: Any, name: str, is_batch: bool) -> TakeApart:
 
     def put(value: Any, parts: Parts) -> None:
         array = np.asarray(value)
-        if not has_tensor(array.dtype):
-            array = array.astype(dtype)
-        parts.tensors[name] = Tensor.of(array, parts.by_column)
+        try:
+            parts.tensors[name] = Tensor.of(array, parts.by_column)
+        except KeyError:
+            # The format has no name for the array's own dtype.
+            parts.tensors[name] = Tensor.of(array.astype(dtype), parts.by_column)
 
     return put
 
@@ -183,14 +185,13 @@ def _array_together(
             refusal.path[:] = path
             raise refusal
         array = tensor.array()
-        try:
-            check_bounds(space, bounds, array)
-        except NotInSpace as refusal:
-            # The first step of the path is the sub-environment.
-            at = 0 if rows.number is None else 1
-            refusal.path[at:at] = path
-            raise
-        return array
+        if bounds.hold(array):
+            return array
+        refusal = bounds.refusal(space, array)
+        # The first step of the path is the sub-environment.
+        at = 0 if rows.number is None else 1
+        refusal.path[at:at] = path
+        raise refusal
 
     return put_together
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Hashable
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 KeyT = TypeVar("KeyT", bound=Hashable)
 ValueT = TypeVar("ValueT")
@@ -13,13 +13,13 @@ ValueT = TypeVar("ValueT")
 ANSWERED_SECONDS = 5.0
 
 
-class InProgress(Generic[KeyT, ValueT]):
-    """The work that threads are doing, each piece under a key.
+class InProgress(dict[KeyT, ValueT]):
+    """The work that threads are doing: any information about each piece, under a unique key.
 
     A thread that is stuck in an environment cannot answer its client. A watchdog abandons its work
     and answers for it. The thread may return with a result at that very moment:
 
-    1. The worker calls ``begin()`` and starts something that may take too long.
+    1. The worker adds its work to the dict, and starts something that may take too long.
     2. Either the worker returns first and calls ``finish()``, which returns True: the result is
        valid, and the watchdog's ``abandon()`` returns False from then on.
     3. Or the watchdog calls ``abandon()`` first, which returns True: the watchdog must answer, and
@@ -34,32 +34,16 @@ class InProgress(Generic[KeyT, ValueT]):
     A worker that does not serve clients itself may skip step 5 and end.
     """
 
-    __slots__ = ("_abandoned", "_in_progress")
+    __slots__ = ("_abandoned",)
 
     def __init__(self) -> None:
         """Start with no work."""
-        self._in_progress: dict[KeyT, ValueT] = {}
+        super().__init__()
         self._abandoned: dict[KeyT, threading.Event] = {}
-
-    def __len__(self) -> int:
-        return len(self._in_progress)
-
-    def items(self) -> list[tuple[KeyT, ValueT]]:
-        """Return the key and value of each piece of work in progress."""
-        return list(self._in_progress.items())
-
-    def begin(self, key: KeyT, value: ValueT) -> None:
-        """Start a piece of work.
-
-        Args:
-            key: its key, unique among the work in progress.
-            value: any information about it.
-        """
-        self._in_progress[key] = value
 
     def finish(self, key: KeyT) -> bool:
         """End a piece of work; return False if it was abandoned or has ended."""
-        return self._in_progress.pop(key, _NONE) is not _NONE
+        return self.pop(key, _NONE) is not _NONE
 
     def abandon(self, key: KeyT) -> bool:
         """Take a piece of work from its thread; return False if it is not in progress."""
@@ -67,7 +51,7 @@ class InProgress(Generic[KeyT, ValueT]):
         answered = threading.Event()
         if self._abandoned.setdefault(key, answered) is not answered:
             return False
-        if self._in_progress.pop(key, _NONE) is not _NONE:
+        if self.finish(key):
             return True
         del self._abandoned[key]
         return False

@@ -56,7 +56,7 @@ class InstanceLock:
         """
         self._lock.acquire()
         self.used = now = time.monotonic()
-        self._held.begin(threading.get_ident(), now)
+        self._held[threading.get_ident()] = now
         if self.closed:
             self._refuse()
 
@@ -81,7 +81,7 @@ class InstanceLock:
         """
         acquired = self._lock.acquire(timeout=timeout)
         if acquired:
-            self._held.begin(threading.get_ident(), time.monotonic())
+            self._held[threading.get_ident()] = time.monotonic()
             if self.closed:
                 self._refuse()
         return acquired
@@ -99,7 +99,7 @@ class InstanceLock:
 
         While that thread waits for the render thread, its work has not started.
         """
-        for thread, since in self._held.items():
+        for thread, since in list(self._held.items()):
             began = self._drawing_since(thread)
             return since if began is None else began
         return None
@@ -115,7 +115,7 @@ class InstanceLock:
             held it.
         """
         self.why, self.closed = why, True
-        for thread, _ in self._held.items():
+        for thread in list(self._held):
             if self._held.abandon(thread):
                 self._abandoned = thread
                 self._lock.release()

@@ -19,17 +19,9 @@ from gym_server.errors import GymServerError, environment_error
 from gym_server.spaces.stacking import ARRAYS
 from gym_server.vector_envs.sub_env import SubEnv
 
-
-class Info(NamedTuple):
-    """The infos of a sub-environment after a reset or step.
-
-    Attributes:
-        info: the info of the step, or of the reset that followed in the same step.
-        final: the info of the step that ended an episode, if a reset followed in the same step.
-    """
-
-    info: dict
-    final: dict | None = None
+# The info of a sub-environment's step, or of the reset that followed in the same step; and then the
+# info of that step, else None.
+Infos = tuple[dict, dict | None]
 
 
 class Outcome(NamedTuple):
@@ -50,7 +42,7 @@ class Outcome(NamedTuple):
     terminated: np.ndarray
     truncated: np.ndarray
     final: dict[int, object]
-    infos: list[Info]
+    infos: list[Infos]
 
 
 class Group:
@@ -116,7 +108,7 @@ class Group:
         seeds: Sequence[int | None],
         later: Sequence[Sequence[int] | None],
         options: dict | None,
-    ) -> tuple[Any, list[Info]]:
+    ) -> tuple[Any, list[Infos]]:
         """Start episodes in some sub-environments.
 
         Args:
@@ -130,13 +122,13 @@ class Group:
             The observations of all sub-environments as a batch, and the infos of those that were
             reset.
         """
-        infos = []
+        infos: list[Infos] = []
         for index, seed, seeds_later in zip(which, seeds, later, strict=True):
             # The environment may change its options.
             own = copy.deepcopy(options)
             with self._naming(index):
                 self._last[index], info = self.envs[index].reset(seed=seed, options=own)
-            infos.append(Info(checked_info(info)))
+            infos.append((checked_info(info), None))
             self._ended[index] = self._rests[index] = False
             self._seeds[index] = None if seeds_later is None else list(reversed(seeds_later))
         return stack_observations(self._observation_space, self._last), infos
@@ -162,7 +154,7 @@ class Group:
         terminated = np.zeros(len(which), dtype=bool)
         truncated = np.zeros(len(which), dtype=bool)
         final: dict[int, object] = {}
-        infos: list[Info] = []
+        infos: list[Infos] = []
         info: dict
         index = 0
         try:
@@ -191,7 +183,7 @@ class Group:
                             last[index], info = self._begin_next(index)
                 if with_infos:
                     final_info = None if final_info is None else checked_info(final_info)
-                    infos.append(Info(checked_info(info), final_info))
+                    infos.append((checked_info(info), final_info))
         except BaseException as failure:
             raise self._named(failure, index) from failure
         observations = last if len(which) == len(last) else [last[index] for index in which]

@@ -12,13 +12,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from gym_server.vector_envs.group import Info
+from gym_server.vector_envs.group import Infos
 
 # The values of one key, by sub-environment.
 Values = dict[int, object]
 
 
-def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: int) -> dict:
+def gather(infos: Iterable[Infos | None], final: Mapping[int, object], num_envs: int) -> dict:
     """Combine the infos of sub-environments.
 
     Args:
@@ -27,11 +27,12 @@ def gather(infos: Iterable[Info | None], final: Mapping[int, object], num_envs: 
         num_envs: the number of sub-environments.
     """
     by_key: dict[str, Values] = {}
-    for row, info in enumerate(infos):
-        if info is not None:
-            if info.final is not None:
-                by_key.setdefault("final_info", {})[row] = info.final
-            for key, value in info.info.items():
+    for row, both in enumerate(infos):
+        if both is not None:
+            info, final_info = both
+            if final_info is not None:
+                by_key.setdefault("final_info", {})[row] = final_info
+            for key, value in info.items():
                 by_key.setdefault(key, {})[row] = value
     return {**_objects("final_obs", final, num_envs), **_arrays(by_key, num_envs)}
 

@@ -268,9 +268,7 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
         request.renderer,
         request.memory,
     )
-    num_workers = make.call_env(
-        choose_num_workers, request.config, request.spec, sub_env, request.renderer
-    )
+    num_workers = choose_num_workers(request.config, request.spec)
     try:
         env = make.call_env(_make_with, request, sub_env, num_workers)
     except GymServerError as refusal:

@@ -7,20 +7,11 @@ the same for any number of processes.
 
 from __future__ import annotations
 
-import json
-import threading
-import time
-from hashlib import blake2b
-
-import gymnasium
 from gymnasium.envs.registration import EnvSpec
 
 from gym_server.envs import registry
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.processes.cores import usable_cores
-from gym_server.rendering.render_thread import RenderThread
-from gym_server.vector_envs.sub_env import SubEnv
 
 # The fewest sub-environments per process, and the least seconds of work per step.
 _FEWEST_SUB_ENVS = 16
@@ -38,10 +29,8 @@ _STEP_SECONDS = {
     "gymnasium.envs.mujoco": 30e-6,
     "ale_py": 200e-6,
 }
-_MEASURED_STEPS = 20
-
-# Clients decide what is measured, so only this many results are remembered, the latest ones.
-_MOST_MEASURED = 1000
+# Of other packages, which by default have one process for all sub-environments.
+_OTHER_STEP_SECONDS = 100e-6
 
 
 def most_workers(config: EnvConfig) -> int:
@@ -57,63 +46,22 @@ def most_workers(config: EnvConfig) -> int:
     return most if most > 1 else 0
 
 
-def choose_num_workers(
-    config: EnvConfig, spec: EnvSpec, sub_env: SubEnv, renderer: RenderThread
-) -> int:
+def choose_num_workers(config: EnvConfig, spec: EnvSpec) -> int:
     """Return how many processes run the sub-environments.
 
     Args:
         config: what the client chose, and the largest number allowed.
         spec: the environment's spec.
-        sub_env: makes a sub-environment, to measure a step if its duration is unknown.
-        renderer: the process's render thread.
     """
     most = min(most_workers(config), config.max_workers)
     if config.wants_workers:
         return most
     if most < 2:
         return 0
-    work = (config.num_envs or 1) * _step_seconds(spec, config, sub_env, renderer)
-    chosen = min(most, int(work / _LEAST_SECONDS))
-    return chosen if chosen > 1 else 0
-
-
-def _step_seconds(
-    spec: EnvSpec, config: EnvConfig, sub_env: SubEnv, renderer: RenderThread
-) -> float:
     module = registry.module_of(spec)
-    for beginning, seconds in _STEP_SECONDS.items():
-        if module.startswith(beginning):
-            return seconds
-    kind = json.dumps([spec.id, config.kwargs, config.wrappers], default=str, sort_keys=True)
-    # This text may be as long as a request, so store its hash.
-    key = blake2b(kind.encode()).digest()
-    known = _measured.get(key)
-    if known is not None:
-        return known
-    measured = _measure(sub_env(), renderer)
-    with _lock:
-        _measured[key] = measured
-        while len(_measured) > _MOST_MEASURED:
-            del _measured[next(iter(_measured))]
-    return measured
-
-
-_lock = threading.Lock()
-_measured: dict[bytes, float] = {}
-
-
-def _measure(env: gymnasium.Env, renderer: RenderThread) -> float:
-    """Return the seconds per step of an environment, and close it."""
-    try:
-        env.reset(seed=0)
-        env.action_space.seed(0)
-        actions = [env.action_space.sample() for _ in range(_MEASURED_STEPS)]
-        began = time.perf_counter()
-        for action in actions:
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-        return (time.perf_counter() - began) / _MEASURED_STEPS
-    finally:
-        renderer.close(env.close, draws_when_stepped(env))
+    seconds = next(
+        (known for beginning, known in _STEP_SECONDS.items() if module.startswith(beginning)),
+        _OTHER_STEP_SECONDS,
+    )
+    chosen = min(most, int((config.num_envs or 1) * seconds / _LEAST_SECONDS))
+    return chosen if chosen > 1 else 0

@@ -24,8 +24,10 @@ def body(number, key="k", data=None, dtype="I32", spaces=0, first=True, **metada
 def parsed(monkeypatch):
     """Return the bodies that were parsed, in a thread that knows no header yet."""
     monkeypatch.setattr(known_headers, "_memory", known_headers._Memory())
-    parsed, parse = [], bodies._parse_tensors
-    monkeypatch.setattr(bodies, "_parse_tensors", lambda raw: parsed.append(raw) or parse(raw))
+    parsed, parse = [], bodies.parse_tensors
+    monkeypatch.setattr(
+        known_headers, "parse_tensors", lambda raw: parsed.append(raw) or parse(raw)
+    )
     return parsed
 
 
@@ -33,7 +35,7 @@ def parsed(monkeypatch):
 def test_a_header_that_comes_again_is_not_parsed_again(parsed, first):
     for number in range(10, 100):
         raw = body(number, data=np.arange(number, number + 4, dtype="<i4").tobytes(), first=first)
-        read = bodies.loads_tensors(raw)
+        read = known_headers.loads_tensors(raw)
         assert read["request"] == {"key": "k", "number": number}
         assert read["action"].tensors["action"].array().tolist() == [*range(number, number + 4)]
     # The first two, and the second again with another number.
@@ -70,22 +72,22 @@ def test_what_differs_is_read_as_if_nothing_were_known(parsed, other):
         except GymServerError as refusal:
             return refusal.code, refusal.message
 
-    fresh = outcome(bodies._parse_tensors)
+    fresh = outcome(bodies.parse_tensors)
     for number in (10, 11, 12):
-        bodies.loads_tensors(body(number))
+        known_headers.loads_tensors(body(number))
     parsed.clear()
-    assert outcome(bodies.loads_tensors) == fresh
+    assert outcome(known_headers.loads_tensors) == fresh
     assert parsed
 
 
 def test_booleans_are_checked_each_time(parsed):
     for number in (10, 11, 12):
-        bodies.loads_tensors(body(number, data=bytes(16), dtype="BOOL"))
+        known_headers.loads_tensors(body(number, data=bytes(16), dtype="BOOL"))
     with pytest.raises(GymServerError, match="neither 0 nor 1"):
-        bodies.loads_tensors(body(13, data=b"\2" * 16, dtype="BOOL"))
+        known_headers.loads_tensors(body(13, data=b"\2" * 16, dtype="BOOL"))
 
 
 def test_a_number_that_stands_elsewhere_is_not_taken_for_the_requests(parsed):
     for number in (10, 11, 12, 13):
         raw = body("5 ", unknown=f'{{"number":{number}}}')
-        assert bodies.loads_tensors(raw)["request"]["number"] == 5
+        assert known_headers.loads_tensors(raw)["request"]["number"] == 5

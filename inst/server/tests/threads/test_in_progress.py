@@ -8,16 +8,16 @@ from gym_server.threads.in_progress import InProgress
 
 def test_work_that_comes_back_in_time_cannot_be_abandoned():
     work = InProgress()
-    work.begin("key", 7)
-    assert (len(work), work.items()) == (1, [("key", 7)])
+    work["key"] = 7
+    assert work == {"key": 7}
     assert work.finish("key")
     assert not work.abandon("key")
-    assert (len(work), work.items()) == (0, [])
+    assert work == {}
 
 
 def test_a_result_that_comes_after_all_is_not_valid():
     work = InProgress()
-    work.begin("key", None)
+    work["key"] = None
     assert work.abandon("key")
     assert not work.abandon("key")
     assert not work.finish("key")
@@ -26,7 +26,7 @@ def test_a_result_that_comes_after_all_is_not_valid():
 def test_of_two_threads_that_end_work_at_once_one_does():
     work = InProgress()
     for key in range(500):
-        work.begin(key, None)
+        work[key] = None
         outcomes, both = [], threading.Barrier(2)
 
         def end(how, key=key, outcomes=outcomes, both=both):
@@ -43,7 +43,7 @@ def test_of_two_threads_that_end_work_at_once_one_does():
 
 def test_a_thread_whose_work_was_abandoned_waits_until_it_was_answered_for():
     work, waited = InProgress(), []
-    work.begin("key", None)
+    work["key"] = None
     assert work.abandon("key")
 
     def wait():
@@ -65,7 +65,7 @@ def test_a_thread_whose_work_was_abandoned_waits_until_it_was_answered_for():
 
 def test_nothing_is_kept_of_work_that_was_answered_for():
     work = InProgress()
-    work.begin("key", None)
+    work["key"] = None
     work.abandon("key")
     work.answered("key")
-    assert (work._in_progress, work._abandoned) == ({}, {})
+    assert (work, work._abandoned) == ({}, {})

@@ -57,7 +57,7 @@ def test_what_an_episode_ended_with_stays_when_the_next_one_changes_it_in_place(
         outcome = group.step(None, [0, 0], True)
     assert outcome.observation.tolist() == [[0], [0]]
     assert outcome.final == {0: [3], 1: [3]}
-    assert [one.final for one in outcome.infos] == [{"steps": 3, "nested": {"list": [3]}}] * 2
+    assert [final for _, final in outcome.infos] == [{"steps": 3, "nested": {"list": [3]}}] * 2
 
 
 def test_an_info_that_holds_itself_ends_an_episode():
@@ -66,4 +66,4 @@ def test_an_info_that_holds_itself_ends_an_episode():
     info.info["itself"] = info.info
     for _ in range(3):
         outcome = group.step(None, [0], True)
-    assert outcome.infos[0].final["itself"]["steps"] == [3]
+    assert outcome.infos[0][1]["itself"]["steps"] == [3]

@@ -2,12 +2,11 @@ import numpy as np
 import pytest
 
 from gym_server.json_values import plain
-from gym_server.vector_envs.group import Info
 from gym_server.vector_envs.infos import gather
 
 
 def gathered(*infos):
-    return plain(gather([None if info is None else Info(info) for info in infos], {}, len(infos)))
+    return plain(gather([None if info is None else (info, None) for info in infos], {}, len(infos)))
 
 
 @pytest.mark.parametrize(
