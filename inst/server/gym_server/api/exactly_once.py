@@ -22,6 +22,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from gym_server.errors import GymServerError
@@ -47,40 +48,29 @@ class Outcome(NamedTuple):
     instance_id: str | None = None
 
 
+@dataclass(slots=True, eq=False)
 class _Row:
     """The last request of one key to one instance, or a creation.
 
     Attributes:
-        lock: held while the request is in progress; a repetition waits for it.
-        place: its place in the table.
-        is_dropped: whether it was removed from the table.
+        place: its place in the table: an instance, and a key.
         instance_id: the instance that it used or created.
+        lock: held while the request is in progress; a repetition waits for it.
+        is_dropped: whether it was removed from the table.
         number: the request's number; -1 before the first.
         kept: the request and the response; None if that took too much memory.
         size: the bytes of both.
         stored: when it was stored, in the clock's seconds.
     """
 
-    __slots__ = (
-        "instance_id",
-        "is_dropped",
-        "kept",
-        "lock",
-        "number",
-        "place",
-        "size",
-        "stored",
-    )
-
-    def __init__(self, instance_id: str | None, name: Hashable) -> None:
-        self.lock = threading.Lock()
-        self.place = instance_id, name
-        self.is_dropped = False
-        self.instance_id = instance_id
-        self.number = -1
-        self.kept: tuple[Hashable, Response] | None = None
-        self.size = 0
-        self.stored = 0.0
+    place: tuple[str | None, Hashable]
+    instance_id: str | None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    is_dropped: bool = False
+    number: int = -1
+    kept: tuple[Hashable, Response] | None = None
+    size: int = 0
+    stored: float = 0.0
 
 
 class ExactlyOnce:
@@ -188,7 +178,7 @@ class ExactlyOnce:
                 row = self._table.get(instance_id, {}).get(name)
                 if row is None:
                     self._make_room_for_row(instance_id)
-                    row = _Row(instance_id, name)
+                    row = _Row((instance_id, name), instance_id)
                     self._table.setdefault(instance_id, {})[name] = row
             row.lock.acquire()
             if not row.is_dropped:

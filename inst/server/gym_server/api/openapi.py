@@ -37,8 +37,7 @@ def document(routes: Iterable[Route]) -> dict:
     routes = list(routes)
     paths: dict[str, dict] = {}
     for route in routes:
-        path = route.path.replace("<", "{").replace(">", "}")
-        paths.setdefault(path, {})[route.method.lower()] = _operation(route)
+        paths.setdefault(route.template, {})[route.method.lower()] = _operation(route)
     _link_created(paths)
     return {
         "openapi": "3.1.0",
@@ -82,8 +81,13 @@ def _operation(route: Route) -> dict:
         },
     }
     parameters = [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-        for name in route.variables
+        {
+            "name": name,
+            "in": "path",
+            "required": True,
+            "schema": {"enum": values} if values else {"type": "string"},
+        }
+        for name, values in route.variables.items()
     ]
     if route.method == "GET":
         parameters += map(_query, route.fields)

@@ -26,7 +26,7 @@ Handler = Callable[..., dict | Response | Ready | None]
 _MOST_KNOWN = 4096
 _LONGEST_KNOWN = 100
 
-_VARIABLE = re.compile("<([a-z_]+)>")
+_VARIABLE = re.compile(r"<(?:any\(([a-z_, ]+)\):)?([a-z_]+)>")
 
 
 class Callers(Enum):
@@ -43,8 +43,8 @@ class Route:
 
     Attributes:
         method: "GET", which also answers HEAD, "POST" or "DELETE".
-        path: also matches without its last slash; ``<name>`` matches any text, which the handler
-            gets under that name.
+        path: also matches without its last slash; ``<name>`` matches any text, and
+            ``<any(a, b):name>`` one of some, which the handler gets under that name.
         fields: the fields of the body, or of a GET's query.
         handler: gets a ``Call``; returns a JSON object, another response, or None for 204.
         answer: a description of the response.
@@ -84,9 +84,17 @@ class Route:
         return 200 if self.answer else 204
 
     @property
-    def variables(self) -> list[str]:
-        """The names of the path's variable parts."""
-        return _VARIABLE.findall(self.path)
+    def template(self) -> str:
+        """The path as in OpenAPI, with ``{name}``."""
+        return _VARIABLE.sub(r"{\2}", self.path)
+
+    @property
+    def variables(self) -> dict[str, list[str] | None]:
+        """The names of the path's variable parts, each with its values; None for any text."""
+        return {
+            name: values.split(", ") if values else None
+            for values, name in _VARIABLE.findall(self.path)
+        }
 
 
 class RouteBlueprint(Blueprint):

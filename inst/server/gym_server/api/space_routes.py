@@ -11,26 +11,13 @@ from gym_server.protocol.fields import ANYTHING, Field
 bp = RouteBlueprint("spaces")
 
 
-@bp.declare(
-    "GET",
-    INSTANCE + "action_space/",
-    answer="info: the space",
-    schema=schemas.SPACE_INFO,
-)
-def env_action_space_info(call: Call) -> dict:
-    """Describe the action space."""
-    return {"info": call.instance.space_info("action_space")}
+_SPACE = INSTANCE + "<any(action_space, observation_space):space>/"
 
 
-@bp.declare(
-    "GET",
-    INSTANCE + "observation_space/",
-    answer="info: the space",
-    schema=schemas.SPACE_INFO,
-)
-def env_observation_space_info(call: Call) -> dict:
-    """Describe the observation space."""
-    return {"info": call.instance.space_info("observation_space")}
+@bp.declare("GET", _SPACE, answer="info: the space", schema=schemas.SPACE_INFO)
+def env_space_info(call: Call) -> dict:
+    """Describe a space."""
+    return {"info": call.instance.space_info(call.path["space"])}
 
 
 @bp.declare(
@@ -56,28 +43,13 @@ def env_action_space_contains(call: Call) -> dict:
     return {"member": call.instance.contains("action_space", {"value": value})}
 
 
-_VALUE = Field("value", ANYTHING, "The value to check; without it, the body is a description.")
-
-
 @bp.declare(
     "POST",
-    INSTANCE + "action_space/contains/",
-    _VALUE,
+    _SPACE + "contains/",
+    Field("value", ANYTHING, "The value to check; without it, the body is a description."),
     answer="member: true or false",
     schema=schemas.MEMBER,
 )
-def env_action_space_contains_posted(call: Call) -> dict:
-    """Check whether a value is an action, or a description matches the action space."""
-    return {"member": call.instance.contains("action_space", call.body)}
-
-
-@bp.declare(
-    "POST",
-    INSTANCE + "observation_space/contains/",
-    _VALUE,
-    answer="member: true or false",
-    schema=schemas.MEMBER,
-)
-def env_observation_space_contains(call: Call) -> dict:
-    """Check whether a value is an observation, or a description matches the observation space."""
-    return {"member": call.instance.contains("observation_space", call.body)}
+def env_space_contains(call: Call) -> dict:
+    """Check whether a value is a member of a space, or a description matches the space."""
+    return {"member": call.instance.contains(call.path["space"], call.body)}

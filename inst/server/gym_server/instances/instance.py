@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
-from gym_server.monitoring.disk_use import DiskUse
 from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.monitoring.recording import Recording
 from gym_server.protocol.answers import JSON_FORM, AnswerForm, Ready
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.lock import InstanceLock
@@ -23,12 +21,7 @@ from gym_server.viewing.watchable import Watchable
 if TYPE_CHECKING:
     import numpy as np
 
-log = logging.getLogger(__name__)
-
 Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
-
-# How often a monitor's files are measured; episodes may be shorter.
-_MEASURE_SECONDS = 1.0
 
 
 class Instance(Watchable):
@@ -70,10 +63,7 @@ class Instance(Watchable):
         self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
-        # Where a monitor writes, if any; when that was last measured; why the last one stopped.
-        self._monitored: tuple[Path, DiskUse] | None = None
-        self._measured = 0.0
-        self._monitor_full: GymServerError | None = None
+        self._recording = Recording(self._close_monitor)
 
     # Resets and steps -----------------------------------------------------------------------
 
@@ -110,8 +100,7 @@ class Instance(Watchable):
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
-            if self._monitored is not None:
-                self._stop_full_monitor(*self._monitored)
+            self._recording.stop_if_full()
             return self._reset(seed, options, form, mask)
 
     def step(
@@ -274,8 +263,7 @@ class Instance(Watchable):
             path, disk_use = root.resolve(directory), root.disk_use
             disk_use.check(path, emptied=force)
             self.record(path, directory, force, resume, video_every)
-            self._monitored, self._monitor_full = (path, disk_use), None
-            self._measure_monitor()
+            self._recording.begin(path, disk_use)
 
     def record(
         self, path: Path, directory: str, force: bool, resume: bool, video_every: int
@@ -298,39 +286,8 @@ class Instance(Watchable):
             GymServerError: ``monitors_full`` if episodes were not recorded for that reason;
                 ``monitor_directory`` if something could not be written.
         """
-        with self.lock, self._monitor_ends():
+        with self.lock, self._recording.ends():
             self._close_monitor()
-
-    @contextlib.contextmanager
-    def _monitor_ends(self) -> Iterator[None]:
-        """Measure a monitor's files at its end; raise if it had no more space."""
-        try:
-            yield
-        finally:
-            self._measure_monitor()
-            self._monitored = None
-        full, self._monitor_full = self._monitor_full, None
-        if full is not None:
-            raise full
-
-    def _measure_monitor(self) -> None:
-        if self._monitored is not None:
-            path, disk_use = self._monitored
-            disk_use.measure(path)
-            self._measured = time.monotonic()
-
-    def _stop_full_monitor(self, path: Path, disk_use: DiskUse) -> None:
-        """Stop recording if monitors have no more space; the environment continues."""
-        if time.monotonic() < self._measured + _MEASURE_SECONDS:
-            return
-        self._measure_monitor()
-        try:
-            disk_use.check(path)
-        except GymServerError as full:
-            log.warning("%s", full.message)
-            with contextlib.suppress(GymServerError), self._monitor_ends():
-                self._close_monitor()
-            self._monitor_full = full
 
     # Beginning and end ----------------------------------------------------------------------
 
@@ -353,7 +310,7 @@ class Instance(Watchable):
             why = self.lock.refusal()
             self.lock.closed = True
             self.viewer.end(why)
-            with self._monitor_ends():
+            with self._recording.ends():
                 self._close(why)
 
     def abandon(self, why: GymServerError) -> int | None:

@@ -45,6 +45,7 @@ class RolloutEnv:
     """Makes the environment of a task, and keeps it for further episodes if that is safe.
 
     Attributes:
+        env: the environment, or the environment's own vector implementation for groups.
         group: how many episodes are played in lockstep; None if episodes are played separately.
         observation_space, action_space: the spaces of one episode.
     """
@@ -57,11 +58,11 @@ class RolloutEnv:
         """
         self._task = task
         own = self._make_own()
-        self._env: Any = self._make() if own is None else own
+        self.env: Any = self._make() if own is None else own
         self.group = None if own is None else GROUP
         prefix = "" if own is None else "single_"
-        self.observation_space: Space = getattr(self._env, f"{prefix}observation_space")
-        self.action_space: Space = getattr(self._env, f"{prefix}action_space")
+        self.observation_space: Space = getattr(self.env, f"{prefix}observation_space")
+        self.action_space: Space = getattr(self.env, f"{prefix}action_space")
         self._used = False
 
     def _make_own(self) -> VectorEnv | None:
@@ -86,44 +87,35 @@ class RolloutEnv:
     @cached_property
     def is_made_anew(self) -> bool:
         """Whether each episode needs a new environment."""
-        module = registry.module_of(self._spec)
+        module = registry.module_of(self.env.spec)
         return not registry.is_known(module) or module.startswith(_MADE_ANEW)
 
     def for_an_episode(self) -> Any:
         """Return an environment that plays like a new one."""
         if self._used and self.is_made_anew:
-            self._env.close()
-            self._env = self._make()
+            self.env.close()
+            self.env = self._make()
         self._used = True
-        return self._env
-
-    @property
-    def for_a_group(self) -> Any:
-        """The environment's own vector implementation, for groups."""
-        return self._env
+        return self.env
 
     def close(self) -> None:
         """Close the environment."""
-        self._env.close()
+        self.env.close()
 
     # What is known of it --------------------------------------------------------------------
-
-    @property
-    def _spec(self) -> Any:
-        return self._env.spec
 
     @property
     def time_limit(self) -> int | None:
         """After how many steps the environment itself ends an episode, or None."""
         if self.group is not None:
-            limit: int | None = self._spec.max_episode_steps
+            limit: int | None = self.env.spec.max_episode_steps
             return limit
-        return wrappers.time_limit(self._env)
+        return wrappers.time_limit(self.env)
 
     @property
     def needs_max_steps(self) -> bool:
         """Whether an episode may never end."""
-        ends = registry.module_of(self._spec).startswith(_ENDING)
+        ends = registry.module_of(self.env.spec).startswith(_ENDING)
         chosen = self._task.config.kwargs or {}
         return self.time_limit is None and (not ends or _ATARI_LIMIT in chosen)
 
@@ -134,9 +126,9 @@ class RolloutEnv:
 
     def describe(self) -> dict:
         """Return what a client must know to make a policy for the environment."""
-        config, spec = self._task.config, self._spec
-        metadata = self._env.metadata or {}
-        env_id = env_id_of(config, self._env)
+        config, spec = self._task.config, self.env.spec
+        metadata = self.env.metadata or {}
+        env_id = env_id_of(config, self.env)
         return {
             "env_id": env_id,
             "observation_space": spaces.describe(self.observation_space),

@@ -158,7 +158,7 @@ class _Playing:
         return len(results), concatenated(results), error
 
     def _play_group(self, env: RolloutEnv, unit: Unit) -> dict[str, Tensor]:
-        group = env.for_a_group
+        group = env.env
         candidates = np.full(group.num_envs, -1)
         candidates[list(unit.rows or ())] = unit.candidates
         actor = self._policy.actor(candidates)

@@ -19,10 +19,10 @@ def found(app):
 @pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.handler.__name__)
 def test_every_route_is_found_with_and_without_its_last_slash(found, route):
     assert route.path.endswith("/")
-    path, variables = route.path, {}
-    for number, name in enumerate(route.variables):
-        variables[name] = str(number)
-        path = path.replace(f"<{name}>", str(number))
+    path, variables = route.template, {}
+    for number, (name, values) in enumerate(route.variables.items()):
+        variables[name] = values[-1] if values else str(number)
+        path = path.replace(f"{{{name}}}", variables[name])
     for written in (path, path.removesuffix("/")):
         assert found(written, route.method) == (route.handler.__name__, variables)
 

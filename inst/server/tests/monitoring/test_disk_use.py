@@ -5,8 +5,8 @@ import csv
 import pytest
 
 from gym_server.api.app import Config, create_app
-from gym_server.instances import instance
 from gym_server.manager.limits import Limits
+from gym_server.monitoring import recording
 
 KIB = 1 / 1024
 
@@ -14,7 +14,7 @@ KIB = 1 / 1024
 @pytest.fixture
 def limited(monitor_dir, monkeypatch):
     """Return a client of an application whose monitors may write little."""
-    monkeypatch.setattr(instance, "_MEASURE_SECONDS", 0.0)
+    monkeypatch.setattr(recording, "_MEASURE_SECONDS", 0.0)
     apps = []
 
     def limited(max_monitor_mb, isolate="none"):
