@@ -6,7 +6,7 @@ from gym_server.api import env_fields, schemas
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
-from gym_server.protocol.answers import Ready, frame_tensor
+from gym_server.protocol.answers import Ready, tensor_response
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.known_headers import loads_tensors
 from gym_server.rendering.png import png
@@ -199,7 +199,7 @@ def env_render(call: Call) -> Response:
     """Draw the current state."""
     frame = call.instance.render(call.fields["sub_env"] or 0)
     if call.form.tensors:
-        return frame_tensor(frame, call.form)
+        return tensor_response({"frame": frame}, {}, call.form.by_column)
     return Response(200, png(frame), "image/png")
 
 

@@ -13,14 +13,13 @@ from gym_server.api.calls import Call
 from gym_server.api.routing import RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, answer_to, invalid_parameter
-from gym_server.protocol.answers import dumps
+from gym_server.protocol.answers import dumps, tensor_response
 from gym_server.protocol.bodies import loads_file
 from gym_server.protocol.fields import OBJECT, Field, Kind
 from gym_server.protocol.safetensors import Tensor
 from gym_server.response import Response
 from gym_server.rollouts.environment import GROUP
 from gym_server.rollouts.task import Keep, Unit
-from gym_server.rollouts.tensors import content
 
 bp = RouteBlueprint("rollouts")
 
@@ -85,12 +84,13 @@ def rollouts(call: Call) -> dict | Response:
     if given["policy"] is None:
         raise GymServerError("missing_parameter", "Episodes need the parameter 'policy'")
     units = _units(tensors)
-    played = call.services.rollouts.play(task, units, is_trusted, call.is_connected)
+    played, error = call.services.rollouts.play(task, units, is_trusted, call.is_connected)
     metadata = {}
-    if played.error is not None:
-        status, body = answer_to(played.error)
+    if error is not None:
+        status, body = answer_to(error)
         metadata["error"] = dumps({"status": status, "body": body}).decode("ascii")
-    return content(played.tensors, metadata, call.form.by_column)
+    arrays = {name: tensor.array() for name, tensor in played.items()}
+    return tensor_response(arrays, metadata, call.form.by_column)
 
 
 def _policy_tensors(tensors: Mapping[str, Tensor]) -> dict[str, np.ndarray]:

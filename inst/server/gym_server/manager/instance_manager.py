@@ -256,8 +256,7 @@ class InstanceManager:
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
         is_trusted = not self._isolation.wants(config.env_id, self._allowed_modules)
-        settings = self._isolation.settings(config.env_id, self._allowed_modules, 0)
-        return Task(config, settings.allowed_modules, self._budget.limit, **what), is_trusted
+        return Task(config, self._allowed_modules, self._budget.limit, **what), is_trusted
 
     def get(self, instance_id: str) -> Instance:
         """Return an instance.

@@ -58,19 +58,6 @@ _WORKER = "gym_server.rollouts.worker"
 _numbers = itertools.count(1)
 
 
-@dataclass
-class Played:
-    """The result of a request.
-
-    Attributes:
-        tensors: the tensors of its first episodes, by name.
-        error: why there are no more episodes; None if there are all, or no room for more.
-    """
-
-    tensors: dict[str, Tensor]
-    error: GymServerError | None
-
-
 @dataclass(eq=False)
 class _Player:
     """A thread with a process.
@@ -131,7 +118,7 @@ class Rollouts:
 
     def play(
         self, task: Task, units: Sequence[Unit], trusted: bool, is_wanted: Callable[[], bool]
-    ) -> Played:
+    ) -> tuple[dict[str, Tensor], GymServerError | None]:
         """Play episodes.
 
         Args:
@@ -139,6 +126,10 @@ class Rollouts:
             units: the episodes.
             trusted: whether the environment's code is Gymnasium's own, or ale_py's.
             is_wanted: returns whether the client still waits for them.
+
+        Returns:
+            The tensors of the first episodes, by name; and why there are no more, or None if these
+            are all, or there is no room for more.
 
         Raises:
             GymServerError: ``too_many_rollouts``, ``too_many_processes``, ``shutting_down``; and
@@ -154,7 +145,7 @@ class Rollouts:
             error = request.failed[1]
             if end == 0:
                 raise error
-        return Played(concatenated(results), error)
+        return concatenated(results), error
 
     def _request(self, task: Task, function: str, trusted: bool, units: Sequence[Unit]) -> Request:
         key = None if trusted else task.env_key

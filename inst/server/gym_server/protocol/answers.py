@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from gym_server.protocol.safetensors import (
     Tensor,
     add_metadata,
     quoted,
+    write,
 )
 from gym_server.protocol.safetensors import join as join_tensors
 from gym_server.response import JSON, Response
@@ -98,10 +100,12 @@ class Ready(NamedTuple):
     steps: int = 0
 
 
-def frame_tensor(frame: np.ndarray, form: AnswerForm) -> Response:
-    """Return a frame as a response with one tensor."""
-    file = join_tensors({"frame": Tensor.of(frame, form.by_column)}, b"")
-    return Response(200, file, COLUMN_TENSORS if form.by_column else TENSORS)
+def tensor_response(
+    arrays: Mapping[str, np.ndarray], metadata: Mapping[str, str], by_column: bool
+) -> Response:
+    """Return arrays and metadata as a response."""
+    tensors = {name: Tensor.of(array, by_column) for name, array in arrays.items()}
+    return Response(200, write(tensors, metadata), COLUMN_TENSORS if by_column else TENSORS)
 
 
 def response_to(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS, Tensor, write
-from gym_server.response import Response
+from gym_server.protocol.safetensors import Tensor
 
 
 def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
@@ -21,11 +20,3 @@ def concatenated(files: Sequence[dict[str, Tensor]]) -> dict[str, Tensor]:
         shape = (sum(part.shape[0] for part in rows), *first.shape[1:])
         tensors[name] = Tensor(first.dtype, shape, b"".join([part.data for part in rows]))
     return tensors
-
-
-def content(tensors: dict[str, Tensor], metadata: dict[str, str], by_column: bool) -> Response:
-    """Return tensors as a response."""
-    if by_column:
-        tensors = {name: Tensor.of(one.array(), by_column) for name, one in tensors.items()}
-    file = write(tensors, metadata)
-    return Response(200, file, COLUMN_TENSORS if by_column else TENSORS)
