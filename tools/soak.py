@@ -106,7 +106,10 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/processes/test_worker_process.py"),
         "drawing": pytest("tests/test_drawing.py", GYM_TEST_DRAWING="all"),
-        "environments": pytest("tests/test_environments.py", GYM_TEST_ENVIRONMENTS="all"),
+        "environments": pytest(
+            "tests/test_environments.py tests/rollouts/test_kept_environments.py",
+            GYM_TEST_ENVIRONMENTS="all",
+        ),
         "parity": testthat("parity", GYM_TEST_PARITY="all"),
         "policies": testthat("policy-on-server", GYM_TEST_POLICIES="all"),
         "orders": testthat("train-orders", GYM_TEST_ORDERS=1000),
