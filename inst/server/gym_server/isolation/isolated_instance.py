@@ -101,20 +101,20 @@ class IsolatedInstance(Instance):
         self.begin_reset_or_step()
         return cast(Ready, self._process.call(method, *args))
 
-    def _ask(self, method: str, *args: object) -> Result:
-        return cast(Result, self._process.call(method, *args))
+    def _ask(self, method: str, *args: object) -> object:
+        return self._process.call("ask", method, *args).value
 
     def _sample_action(self) -> object:
-        return self._ask("sample_action").value
+        return self._ask("sample_action")
 
     # Looks ----------------------------------------------------------------------------------
 
     def _render(self, sub_env: int) -> np.ndarray:
-        return cast("np.ndarray", self._ask("render", sub_env).frame)
+        return cast("np.ndarray", self._process.call("render", sub_env).frame)
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
-        result = self._ask("look", sub_env)
+        result = self._process.call("look", sub_env)
         return dict(_dict(result)), result.frame
 
     def _transition_model(self) -> Ready:
@@ -124,15 +124,15 @@ class IsolatedInstance(Instance):
 
     def space_info(self, name: str) -> dict:
         """Return the description of a space."""
-        return _dict(self._process.query("space_info", name))
+        return _dict(self._process.query("ask", "space_info", name))
 
     def contains(self, name: str, claim: dict) -> bool:
         """Answer a client's "contains" question."""
-        return bool(self._process.query("contains", name, claim).value)
+        return bool(self._process.query("ask", "contains", name, claim).value)
 
     def _about(self) -> dict:
         try:
-            self._last_about = _dict(self._process.query("about", timeout=_ABOUT_SECONDS))
+            self._last_about = _dict(self._process.query("ask", "about", timeout=_ABOUT_SECONDS))
         except TimeoutError:
             log.info("The process of %s does not answer at the moment", self.env_id)
         return {**self._last_about, "isolated": True}
@@ -154,7 +154,7 @@ class IsolatedInstance(Instance):
     ) -> None:
         """Record the episodes that start from now on; see ``Instance.record()``."""
         how = (directory, force, resume, video_every)
-        self._ask("record", self.instance_id, path, *how)
+        self._process.call("record", self.instance_id, path, *how)
 
     def _close_monitor(self) -> None:
         self._ask("close_monitor")

@@ -111,9 +111,9 @@ def step(action: object, form: tuple, mask: Any) -> Ready:
     return _ready(outcome, _instance.steps - before)
 
 
-def sample_action() -> Result:
-    """See ``Instance.sample_action()``."""
-    return Result(_instance.sample_action())
+def ask(method: str, *args: Any) -> Result:
+    """Call a method of the instance that returns a JSON value; also while another call runs."""
+    return Result(getattr(_instance, method)(*args))
 
 
 def render(sub_env: int) -> Result:
@@ -139,36 +139,6 @@ def record(instance_id: str, path: Path, *args: Any) -> Result:
     return Result(None)
 
 
-def close_monitor() -> Result:
-    """See ``Instance.close_monitor()``."""
-    _instance.close_monitor()
-    return Result(None)
-
-
-def close() -> Result:
-    """See ``Instance.close()``."""
-    _instance.close()
-    return Result(None)
-
-
 def _ready(result: dict | Ready, steps: int = 0) -> Ready:
     response = response_to(result, None)
     return Ready(response.body, response.content_type, steps)
-
-
-# Queries, also while a call runs ------------------------------------------------------------
-
-
-def about() -> Result:
-    """See ``Instance.about()``."""
-    return Result(_instance.about())
-
-
-def space_info(name: str) -> Result:
-    """See ``Instance.space_info()``."""
-    return Result(_instance.space_info(name))
-
-
-def contains(name: str, claim: dict) -> Result:
-    """See ``Instance.contains()``."""
-    return Result(_instance.contains(name, claim))

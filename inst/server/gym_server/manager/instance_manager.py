@@ -144,8 +144,6 @@ class InstanceManager:
         make_it = self._make_isolated if isolated else self._make
         with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
             instance = make_it(creation.config, creation, undo)
-            if not isolated:
-                self._note_processes(instance, creation.taken)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -195,15 +193,6 @@ class InstanceManager:
         finally:
             self._release(creation)
 
-    def _note_processes(self, instance: Instance, taken: _Taken) -> None:
-        """Release the room for processes that were not needed.
-
-        Not for an isolated environment: its untrusted process would report the number.
-        """
-        processes = instance.about()["num_workers"] or 0
-        with self._lock:
-            taken.room = replace(taken.room, processes=processes)
-
     def _release(self, whose: _Creation | str) -> None:
         """Release the share of an environment that was closed, or not created after all."""
         taken = self._taken.pop(whose, None)
@@ -212,14 +201,20 @@ class InstanceManager:
             self.left_garbage = True
 
     def _make(self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
-        return make_instance(
+        taken = creation.taken
+        instance = make_instance(
             config,
             self._allowed_modules,
             self._limits.max_num_envs,
             self._renderer,
             undo,
-            creation.taken.reservation,
+            taken.reservation,
         )
+        # Release the room for processes that were not needed. Not for an isolated environment: its
+        # untrusted process would report the number.
+        with self._lock:
+            taken.room = replace(taken.room, processes=instance.num_workers or 0)
+        return instance
 
     def _make_isolated(
         self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
