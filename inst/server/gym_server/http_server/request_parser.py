@@ -142,6 +142,7 @@ class RequestParser:
             refuse: see ``Application.refuse()``.
         """
         self._max_body_bytes = max_body_bytes
+        self._unchecked_bytes = min(max_body_bytes, _SMALL_BODY_BYTES)
         self._send = send
         self._refusal = refusal
         self._bodies = bodies
@@ -180,29 +181,30 @@ class RequestParser:
         self._unreported_bytes += len(data)
         try:
             while data:
-                data = self._parse(data)
+                try:
+                    self._parser.feed_data(data)
+                    data = b""
+                except HttpParserUpgrade as upgrade:
+                    data = self._without_upgrade(data[upgrade.args[0] :])
             if self._unreported_bytes > _LARGEST_HEAD_BYTES:
                 self._refuse_head()
         except HttpParserError as error:
             self._end_with(self._refuse(400, self._fault or str(error)))
         return self._complete
 
-    def _parse(self, data: bytes) -> bytes:
-        """Parse bytes; return those that must be parsed again."""
-        try:
-            self._parser.feed_data(data)
-        except HttpParserUpgrade as upgrade:
-            # The client asks for a protocol that this server does not speak. httptools then treats
-            # everything that follows as that protocol, including the request's body. So parse the
-            # head again without the headers that ask for it.
-            request = self._complete.pop()
-            if request.method == "CONNECT":
-                self._request = request
-                self._end_with(self._refuse(400, "this is no proxy"))
-                return b""
-            self._parser = HttpRequestParser(self)
-            return request.plain_head() + data[upgrade.args[0] :]
-        return b""
+    def _without_upgrade(self, rest: bytes) -> bytes:
+        """Return the bytes to parse again after a client asked for another protocol.
+
+        httptools treats everything that follows as that protocol, including the request's body. So
+        the head is parsed again without the headers that ask for it.
+        """
+        request = self._complete.pop()
+        if request.method == "CONNECT":
+            self._request = request
+            self._end_with(self._refuse(400, "this is no proxy"))
+            return b""
+        self._parser = HttpRequestParser(self)
+        return request.plain_head() + rest
 
     def _end_with(self, refusal: Response) -> None:
         """Refuse the current request; the connection closes after the response."""
@@ -258,7 +260,9 @@ class RequestParser:
             # A proxy in front of this server might disagree about where the body ends.
             self._fault = "it does not say in one way where it ends"
             raise HttpParserError
-        self._check_size(int(headers.get(b"content-length", 0)))
+        size = int(headers.get(b"content-length", 0))
+        if size > self._unchecked_bytes:
+            self._check_size(size)
         if headers.get(b"expect", b"").lower() == b"100-continue":
             if request.refusal is not None:
                 self._end_with(request.refusal)
@@ -270,7 +274,8 @@ class RequestParser:
         self._unreported_bytes = 0
         request = self._request
         request.body_bytes += len(data)
-        self._check_size(request.body_bytes)
+        if request.body_bytes > self._unchecked_bytes:
+            self._check_size(request.body_bytes)
         while (
             request.refusal is None and request.body_bytes > request.held_bytes + _SMALL_BODY_BYTES
         ):
@@ -283,7 +288,7 @@ class RequestParser:
     def _check_size(self, size: int) -> None:
         if size > self._max_body_bytes:
             self._discard_body(self._refuse(413, ""))
-        elif size > _SMALL_BODY_BYTES and not self._request.was_checked:
+        elif not self._request.was_checked:
             self._request.was_checked = True
             if refusal := self._refusal(self._request):
                 self._discard_body(refusal)

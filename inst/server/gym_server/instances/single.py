@@ -82,7 +82,7 @@ class SingleInstance(LocalInstance):
             "terminated": terminated,
             "truncated": truncated,
             # Convert it now, before the environment can change it.
-            "info": plain(checked_info(info)) if form.infos else {},
+            "info": plain(info) if form.infos and checked_info(info) else {},
         }
 
     def _sample_action(self) -> object:

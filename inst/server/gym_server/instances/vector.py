@@ -180,7 +180,7 @@ class VectorInstance(LocalInstance):
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
-            "info": plain(checked_info(info)) if form.infos else {},
+            "info": plain(info) if form.infos and checked_info(info) else {},
             **final,
         }
         if isinstance(answer["observation"], spaces.Parts):
