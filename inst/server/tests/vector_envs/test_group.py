@@ -46,8 +46,8 @@ def test_a_failure_names_the_sub_environment_whose_action_it_was(group):
 def test_each_sub_environment_has_options_of_its_own():
     group = group_of("Counting-v0", [0, 1], AutoresetMode.NEXT_STEP)
     _, infos = group.reset([0, 1], [1, 2], [None] * 2, {"starts": [1]})
-    infos[0].info["options"]["starts"].clear()
-    assert infos[1].info["options"] == {"starts": [1]}
+    infos[0][0]["options"]["starts"].clear()
+    assert infos[1][0]["options"] == {"starts": [1]}
 
 
 def test_what_an_episode_ended_with_stays_when_the_next_one_changes_it_in_place():
@@ -62,8 +62,8 @@ def test_what_an_episode_ended_with_stays_when_the_next_one_changes_it_in_place(
 
 def test_an_info_that_holds_itself_ends_an_episode():
     group = group_of("KeepsItsArrays-v0", [0], AutoresetMode.SAME_STEP)
-    _, [info] = group.reset([0], [1], [None], None)
-    info.info["itself"] = info.info
+    _, [(info, _)] = group.reset([0], [1], [None], None)
+    info["itself"] = info
     for _ in range(3):
         outcome = group.step(None, [0], True)
     assert outcome.infos[0][1]["itself"]["steps"] == [3]
