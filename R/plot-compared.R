@@ -35,7 +35,6 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
   }
   bands <- object$by == "steps" || type == "profile"
   shape <- if (bands) "band" else "bar"
-  if (object$by == "steps") shape <- paste("seeds that have reached the target;", shape)
   notes <- if (length(object$notes)) paste0("note: ", object$notes)
   ids <- unique(object$runs$env_id)
   picture +
@@ -48,6 +47,8 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
 
 score_label <- function(x) if (is.null(x$reference)) "mean return" else "normalised score"
 
+statistic_names <- c(mean = "mean", median = "median", iqm = "interquartile mean")
+
 scores_picture <- function(x) {
   table <- x$table
   table$statistic <- factor(table$statistic, unique(table$statistic))
@@ -56,7 +57,9 @@ scores_picture <- function(x) {
     .data$value, .data$training, xmin = .data$lower, xmax = .data$upper, colour = .data$training
   )) +
     ggplot2::geom_pointrange() +
-    ggplot2::facet_wrap(ggplot2::vars(.data$statistic), ncol = 1L) +
+    ggplot2::facet_wrap(
+      ggplot2::vars(.data$statistic), ncol = 1L, labeller = ggplot2::as_labeller(statistic_names)
+    ) +
     ggplot2::scale_colour_manual(values = named_colours(unique(x$table$training)), guide = "none") +
     ggplot2::labs(x = score_label(x), y = NULL)
 }
@@ -122,7 +125,7 @@ reached_picture <- function(x) {
       ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
     }) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
-    ggplot2::labs(x = training_steps_label, y = "share of seeds")
+    ggplot2::labs(x = training_steps_label, y = "share that reached the target")
 }
 
 match_profile <- function(runs, profile) {

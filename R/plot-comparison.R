@@ -32,6 +32,7 @@ comparison_picture <- function(rollouts) {
       breaks = rows$y, labels = vapply(as.character(rows$label), broken_text, "", width = 20),
       sec.axis = ggplot2::dup_axis(labels = paste("median", number_text_each(rows$median)))
     ) +
+    ggplot2::scale_x_continuous(breaks = data$marks %||% ggplot2::waiver()) +
     picture_labels(data$title, data$subtitle, x = returns_label, y = NULL) +
     theme_gym() +
     ggplot2::theme(axis.title.y.right = ggplot2::element_blank())
@@ -42,7 +43,7 @@ comparison_picture <- function(rollouts) {
 #' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `y` (the
 #'   place of the row), `median`; `returns`, `shapes`, data frames with a column `label`: the
 #'   returns (`value`), and the corners of the areas (`x`, `y`, and `area`, the number of the area);
-#'   `title`, `subtitle`.
+#'   `marks`, the places of bars on the axis, if all rows are bars; `title`, `subtitle`.
 #' @noRd
 comparison_plot_data <- function(rollouts) {
   groups <- unlist(unname(Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)),
@@ -63,6 +64,7 @@ comparison_plot_data <- function(rollouts) {
       value = unlist(shown, use.names = FALSE)
     ),
     shapes = do.call(rbind, Map(row_shapes, label, y, each, bars)),
+    marks = if (!any(vapply(bars, is.null, NA))) bar_marks(unique(do.call(rbind, bars)["value"])),
     title = paste(unique(vapply(rollouts, function(x) x$env_id, "")), collapse = ", "),
     subtitle = c(
       if (length(shown) < length(groups)) {

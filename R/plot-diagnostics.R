@@ -19,9 +19,11 @@ diagnostics_picture <- function(x, call = rlang::caller_env()) {
   ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +
     ggplot2::geom_line(colour = gym_colours[["blue"]], linewidth = 0.6) +
     ggplot2::geom_point(colour = gym_colours[["blue"]], size = 0.6) +
-    ggplot2::facet_wrap(ggplot2::vars(.data$name), scales = "free_y") +
+    ggplot2::facet_wrap(ggplot2::vars(.data$name), scales = "free_y", ncol = 2L) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA), n.breaks = 4) +
-    number_axis(ggplot2::scale_y_continuous, n.breaks = 4) +
+    number_axis(
+      ggplot2::scale_y_continuous, n.breaks = 4, guide = ggplot2::guide_axis(check.overlap = TRUE)
+    ) +
     picture_labels(trainings_title(list(x)), x = training_steps_label, y = NULL) +
-    theme_gym()
+    theme_gym_panels()
 }

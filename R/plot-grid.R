@@ -6,7 +6,8 @@ grid_picture <- function(data, layers) {
   ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
     layers +
     taxi_layers(data) +
-    ggplot2::scale_y_reverse() +
+    ggplot2::scale_x_continuous(expand = c(0.01, 0)) +
+    ggplot2::scale_y_reverse(expand = c(0.01, 0)) +
     ggplot2::coord_fixed() +
     theme_gym_bare() +
     # The key fits beside a square grid, or above a wide one.

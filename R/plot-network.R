@@ -2,7 +2,7 @@
 #'
 #' Draw the diagram of a network: its layers from left to right, neurons as circles, weights as
 #' lines. A line is wider the further its weight is from 0. Positive weights are blue; negative ones
-#' are vermillion and dashed. Biases are the weights of a circle with a 1, the last of its layer. If
+#' are gold and dashed. Biases are the weights of a circle with a 1, the last of its layer. If
 #' there are few weights, the lines carry their numbers. Dots stand for the neurons that are left
 #' out of a large layer.
 #'
@@ -98,10 +98,11 @@ network_sizes <- function(x) paste("network", paste(x$sizes, collapse = "-"))
 # White behind a number, so that its line does not cross it.
 number_layers <- function(weights) {
   place <- ggplot2::aes(.data$label_x, .data$label_y, label = .data$label)
+  # To the right of its place, where it does not cover the neuron.
   list(
-    ggplot2::geom_label(place, weights, size = 2.8, colour = "white", fill = "white",
+    ggplot2::geom_label(place, weights, size = 2.8, hjust = 0, colour = "white", fill = "white",
                         label.padding = ggplot2::unit(0.1, "lines")),
-    ggplot2::geom_text(place, weights, size = 2.8)
+    ggplot2::geom_text(place, weights, size = 2.8, hjust = -0.06)
   )
 }
 

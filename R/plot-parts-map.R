@@ -35,8 +35,12 @@ autoplot.gym_parts_map <- function(object, ...) {
     (if (length(object$panels)) {
       ggplot2::facet_wrap(object$panels, labeller = ggplot2::label_both)
     }) +
+    ggplot2::scale_x_continuous(breaks = few_breaks, expand = c(0, 0)) +
+    ggplot2::scale_y_continuous(breaks = few_breaks, expand = c(0, 0)) +
     picture_labels(
-      object$env_id %||% "Decision map", policy_subtitle(object), x = object$x, y = object$y
+      object$env_id %||% "Decision map", policy_subtitle(object),
+      x = observation_labels(object$env_id, object$x),
+      y = observation_labels(object$env_id, object$y)
     ) +
     theme_gym()
 }

@@ -86,5 +86,5 @@ bar_half <- function(values, across = diff(range(values))) {
 
 # Axis marks at the values of bars; NULL if two are too near for their numbers to fit.
 bar_marks <- function(bars) {
-  if (nrow(bars) == 1L || min(diff(bars$value)) > diff(range(bars$value)) / 12) bars$value
+  if (nrow(bars) == 1L || min(diff(sort(bars$value))) > diff(range(bars$value)) / 12) bars$value
 }

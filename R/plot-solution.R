@@ -154,10 +154,10 @@ value_layers <- function(data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   size <- text_size(data, cells$text)
   # Below the actions, if there are any.
-  below <- if (any(nzchar(cells$does))) 0.33 else 0
+  below <- if (any(nzchar(cells$does))) 0.3 else 0
   c(
     list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
-    action_layers(data, cells, above = if (size > 0) 0.12 else 0),
+    action_layers(data, cells, above = if (size > 0) 0.15 else 0),
     if (size > 0) {
       each_ink(cells, function(cells, ink) {
         ggplot2::geom_text(
@@ -185,12 +185,12 @@ q_layers <- function(data) {
                y = moves$row + along[, 2L] + sign * across[, 2L])
   }
   corners <- rbind(data.frame(moves, x = moves$column, y = moves$row), corner(1), corner(-1))
-  moves$x <- moves$column + 0.32 * step[, 1L]
+  moves$x <- moves$column + 0.3 * step[, 1L]
   moves$y <- moves$row + 0.34 * step[, 2L]
   moves$text <- number_texts(moves$q)
   moves$ink <- ink_on(moves$q)
   # Two numbers are side by side.
-  size <- text_size(data, strrep("0", 2 * nchar(moves$text) + 2))
+  size <- text_size(data, strrep("0", 2 * nchar(moves$text) + 3))
   c(
     list(
       ggplot2::geom_polygon(

@@ -33,7 +33,10 @@ theme_gym <- function() {
     ggplot2::theme(
       plot.title = text(face = "bold", size = ggplot2::rel(1.1)),
       plot.subtitle = text(colour = "grey30", size = ggplot2::rel(0.9)),
+      plot.caption = text(hjust = 0, size = ggplot2::rel(0.72)),
       plot.title.position = "plot", plot.caption.position = "plot",
+      # The number at the right end of an axis reaches beyond the panel.
+      plot.margin = ggplot2::margin(5.5, 13, 5.5, 5.5),
       legend.position = "top", legend.justification = "left", legend.box = "vertical",
       legend.box.just = "left", legend.margin = ggplot2::margin(),
       legend.spacing = ggplot2::unit(2, "pt"), legend.box.spacing = ggplot2::unit(4, "pt"),
@@ -41,6 +44,15 @@ theme_gym <- function() {
       legend.title = text(size = ggplot2::rel(0.8)), legend.text = text(size = ggplot2::rel(0.75)),
       panel.grid.minor = ggplot2::element_blank(), strip.clip = "off",
       strip.text = text(hjust = 0, size = ggplot2::rel(0.7), margin = ggplot2::margin(b = 2))
+    )
+}
+
+# For pictures of many panels, which are small.
+theme_gym_panels <- function() {
+  theme_gym() +
+    ggplot2::theme(
+      axis.text = ggplot2::element_text(size = ggplot2::rel(0.7)),
+      panel.spacing.x = ggplot2::unit(12, "pt")
     )
 }
 
@@ -61,7 +73,7 @@ picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, capti
   ggplot2::labs(
     title = broken_text(title, 38),
     subtitle = if (length(lines)) paste(lines, collapse = "\n"),
-    caption = if (length(caption)) paste(strwrap(caption, 1.3 * width), collapse = "\n"), ...
+    caption = if (length(caption)) paste(strwrap(caption, 1.25 * width), collapse = "\n"), ...
   )
 }
 
@@ -142,11 +154,19 @@ number_axis <- function(scale, ...) {
   scale(labels = function(at) ifelse(is.na(at), NA, number_text_each(at)), ...)
 }
 
-# Axis marks: all whole numbers if there are few, because actions are whole.
+# The panels' titles, one line each if they fit half of four inches.
+wrapped_strips <- function(columns = 2) ggplot2::label_wrap_gen(66 %/% columns)
+
+# Axis marks: all whole numbers if there are few, because actions are whole. `pretty()` may give
+# more than asked for.
 few_breaks <- function(limits, n = 5) {
   from <- ceiling(limits[[1L]])
   to <- floor(limits[[2L]])
-  if (from < to && to - from < n) from:to else pretty(limits, n)
+  if (from < to && to - from < n) {
+    return(from:to)
+  }
+  at <- pretty(limits, n)
+  if (sum(at >= limits[[1L]] & at <= limits[[2L]]) > n + 1) pretty(limits, n - 1) else at
 }
 
 # Rounds are whole numbers from 1, and so are their axis marks.

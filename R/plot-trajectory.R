@@ -2,6 +2,8 @@
 
 trajectory_picture <- function(x, data) {
   near <- near_rows(data)
+  panels <- nrow(data$panels)
+  columns <- if (panels > 3L) 2L else 1L
   values <- panel_values(data)
   of_kind <- function(kind) values[values$kind == kind, ]
   place <- ggplot2::aes(.data$time, .data$value, colour = .data$part)
@@ -25,8 +27,8 @@ trajectory_picture <- function(x, data) {
     choice_layers(of_kind("choice"), data$choices) +
     part_scale(levels(values$part)) +
     ggplot2::facet_wrap(
-      ggplot2::vars(.data$panel), scales = "free_y", ncol = if (nrow(data$panels) > 3L) 2L else 1L,
-      labeller = ggplot2::as_labeller(panel_titles(data))
+      ggplot2::vars(.data$panel), scales = "free_y", ncol = columns,
+      labeller = ggplot2::as_labeller(panel_titles(data), wrapped_strips())
     ) +
     ggplot2::scale_x_continuous(breaks = few_breaks) +
     ggplot2::scale_y_continuous(
@@ -35,7 +37,11 @@ trajectory_picture <- function(x, data) {
     picture_labels(
       x$env_id, c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL
     ) +
-    theme_gym()
+    theme_gym_panels() +
+    # If the last panel stands alone, the title of its axis is below it.
+    ggplot2::theme(
+      axis.title.x = ggplot2::element_text(hjust = if (panels %% columns) 0.25 else 0.5)
+    )
 }
 
 limit_colours <- c(failure = gym_colours[["brown"]], goal = gym_colours[["green"]])
@@ -81,7 +87,7 @@ choice_layers <- function(values, choices) {
     ),
     ggplot2::geom_blank(ggplot2::aes(.data$time, .data$value), ends),
     ggplot2::scale_fill_manual(
-      name = "action", values = named_colours(labels), limits = labels, guide = rows_of_key(labels)
+      name = NULL, values = named_colours(labels), limits = labels, guide = rows_of_key(labels)
     )
   )
 }
@@ -121,9 +127,7 @@ panel_titles <- function(data) {
   text <- vapply(labels, function(label) {
     unique(data$limits$text[data$limits$panel == label])[1L]
   }, "")
-  between <- ifelse(nchar(labels) + nchar(text) > 24, ",\n", ", ")
-  titles <- vapply(labels, broken_text, "", width = 26)
-  stats::setNames(ifelse(is.na(text), titles, paste0(titles, between, text)), labels)
+  stats::setNames(ifelse(is.na(text), labels, paste0(labels, ", ", text)), labels)
 }
 
 most_panels <- 8L

@@ -34,8 +34,16 @@ draw("luck", cartpole$searches)
 draw("training", trained$one)
 agents <- trained$trained
 draw("trainings", agents$ars)
+draw("trainings-single", first = agents$ars$trainings[[1]], second = agents$cem$trainings[[1]])
 draw("trainings-compared", random = agents$random,
      `hill climbing` = agents$hill_climb, CEM = agents$cem, ARS = agents$ars)
+
+draw("compared-steps", compare_trainings(CEM = agents$cem, ARS = agents$ars, PPO = agents$ppo))
+curves <- learning_curves(CEM = agents$cem, ARS = agents$ars, PPO = agents$ppo)
+scores <- compare_trainings(curves, steps = 3000, seed = 1)
+draw("compared-scores", scores)
+draw("compared-profile", scores, type = "profile")
+draw("compared-improvement", scores, type = "improvement")
 
 follow_pole <- function(observation) as.integer(observation[, "pole_angle"] > 0)
 policies <- list(random = policy_random(), `follow the pole` = follow_pole, found = policy)
@@ -82,10 +90,22 @@ walk <- data.frame(
 )
 draw("values-points", solve_mdp(gym_model(walk, start = 3, id = "Walk"), policy = policy_random()))
 draw("states", decision_map("FrozenLake-v1", lake$policy))
+draw("states-q", decision_map("FrozenLake-v1", policy_table(lake$q)), type = "q")
+sums <- rep(0:31, each = 22)
+sticks <- policy_table(cbind(sums >= 20, sums < 20) + 0)
+draw("states-parts", decision_map("Blackjack-v1", sticks, "dealer_card", "player_sum",
+                                  xlim = c(1, 10), ylim = c(12, 21)))
 draw("states-taxi", decision_map("Taxi-v4", solve_mdp("Taxi-v4")$policy))
 
-learned <- learn_q("CliffWalking-v1", iterations = 30, learning_rate = 0.5, discount = 1, seed = 1)
+learned <- learn_q("CliffWalking-v1", iterations = 30, learning_rate = 0.5, discount = 1,
+                   max_steps = 1000, seed = 1)
 draw("training-learner", learned)
+
+by_gradients <- learn_ppo("CartPole-v1", total_steps = 10000, target = Inf, seed = 1)
+draw("diagnostics", by_gradients, type = "diagnostics")
+settings <- expand.grid(step_size = c(0.02, 0.1), noise = c(0.05, 0.1))
+draw("sweep", sweep_agent(agent_ars, "CartPole-v1", settings, seeds = 1:5, total_steps = 5000,
+                          target = Inf, eval_every = 2, eval_episodes = 10))
 
 testbed <- bandit(arms = 10, horizon = 500)
 greedy <- learn_bandit(testbed, epsilon = 0, learners = 300, seed = 1)

@@ -31,6 +31,7 @@ test_that("rows show their own returns, medians and densities, or bars of one wi
   whole <- density(many, from = 10, to = 40)
   expect_identical(range(shape("a")$x), c(10, 40))
   expect_equal(shape("a")$y[seq_along(whole$y) + 1], 2 + 0.75 * whole$y / max(whole$y))
+  expect_null(data$marks)
   bars <- rbind(shape("b"), shape("c"))
   expect_identical(unique(shape("b")$area), 1:2)
   widths <- tapply(bars$x, paste(bars$label, bars$area), function(x) diff(range(x)))
@@ -38,6 +39,8 @@ test_that("rows show their own returns, medians and densities, or bars of one wi
   # The higher bar of a row fills it, the other is a third as high.
   heights <- tapply(shape("b")$y, shape("b")$area, max)
   expect_equal(as.vector(heights), 1 + 0.75 * c(1, 1 / 3))
+  few <- comparison_plot_data(list(a = played_with(c(3, 3)), b = played_with(c(0, 0, 5, 5))))
+  expect_setequal(few$marks, c(0, 3, 5))
 })
 
 test_that("the policies of one rollout have a row each, with their names", {

@@ -44,10 +44,31 @@ test_that("text above a picture is broken where four inches end, a part a line",
   expect_null(picture_labels("a")$subtitle)
 })
 
+test_that("titles and keys fit four inches", {
+  local_device()
+  widths <- function(picture) {
+    grob <- ggplot2::ggplotGrob(picture)
+    above <- grob$grobs[grepl("guide-box|title|caption", grob$layout$name)]
+    vapply(above, function(part) grid::convertWidth(grid::grobWidth(part), "in", TRUE), 0)
+  }
+  labels <- paste("push", c("left", "right", "not at all", "once more"))
+  rows <- data.frame(x = 1:4, label = labels)
+  expect_fits <- function(labels) {
+    picture <- ggplot2::ggplot(rows, ggplot2::aes(.data$x, .data$x, colour = .data$label)) +
+      ggplot2::geom_point() + key_of_marks(line_marks(labels)) + theme_gym() +
+      picture_labels(strrep("word ", 20), strrep("word ", 30), caption = strrep("word ", 40))
+    expect_lte(max(widths(picture)), 4)
+  }
+  expect_fits(labels)
+  expect_fits(paste(labels, "and wait"))
+})
+
 test_that("marks on an axis are whole numbers where some fit", {
   expect_identical(few_breaks(c(-0.5, 1.5)), 0:1)
   expect_identical(few_breaks(c(-2.4, 2.4)), -2:2)
   expect_identical(few_breaks(c(0.01, 0.09)), pretty(c(0.01, 0.09)))
+  # A half of four inches has room for four, and pretty() gives six.
+  expect_length(few_breaks(c(-0.54, -0.49), 4), 4)
   expect_equal(round_ticks(1), 1)
   expect_equal(round_ticks(50), c(10, 20, 30, 40, 50))
   for (last in 1:60) {

@@ -140,7 +140,7 @@ test_that("limits are drawn in their own panels, and named in all", {
   limits <- layers_of(drawn(autoplot(played, type = "trajectory")), "GeomHline")[[1]]
   expect_equal(limits$yintercept[limits$PANEL == 3], c(-12, 12) * pi / 180)
   titles <- panel_titles(trajectory_plot_data(played))
-  expect_identical(titles[["pole angle (rad)"]], "pole angle (rad),\nfails at \u00b112\u00b0")
+  expect_identical(titles[["pole angle (rad)"]], "pole angle (rad), fails at \u00b112\u00b0")
 })
 
 test_that("the numbers of an action share a panel, and have a key", {
