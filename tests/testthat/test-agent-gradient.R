@@ -140,6 +140,49 @@ test_that("how many episodes an iteration has follows from the last one", {
   expect_identical(next_episodes(agent_dqn()), 1L)
 })
 
+test_that("settings are those of an iteration's first step, and no update of DQN is lost", {
+  set.seed(1)
+  falling <- schedule_linear(1, 0, 12)
+  agent <- started(agent_dqn(learning_starts = 0, batch = 2, memory = 60, updates_per_step = 0.3,
+                             epsilon = falling, learning_rate = falling))
+  expect_identical(agent_behavior(agent)$epsilon, 1)
+  # 1.8 updates are due after six steps, 3.6 after twelve, 5.4 after eighteen.
+  logged <- lapply(1:3, function(iteration) {
+    agent <<- agent_tell(agent, told(TRUE))
+    agent$log[c("n_updates", "exploration_rate", "learning_rate")]
+  })
+  expect_equal(unname(do.call(rbind, logged)), rbind(c(1, 1, 1), c(3, 0.5, 0.5), c(5, 0, 0)))
+  expect_equal(agent$carried, 0.4)
+  expect_identical(agent_behavior(agent)$epsilon, 0)
+})
+
+test_that("DQN plays before it learns, for as many steps as asked", {
+  agent <- started(agent_dqn(learning_starts = 7, batch = 2, memory = 60))
+  after <- agent_tell(agent, told(TRUE))
+  expect_identical(after$updates, 0)
+  expect_identical(agent_tell(after, told(TRUE))$updates, 3)
+})
+
+test_that("PPO in one pass over all steps without a clip follows the gradient of A2C", {
+  set.seed(1)
+  policy <- policy_network(c(3, 5, 2), bias = TRUE, output = "softmax")
+  value <- value_network(policy)
+  observation <- matrix(rnorm(30), 10)
+  action <- act(policy, observation)
+  expected <- predict(value, observation, "output")
+  return <- expected + rnorm(10)
+  advantage <- return - expected
+  settings <- agent_ppo(epochs = 1, batch = Inf, clip = Inf, normalize_advantages = FALSE)
+  found <- ppo_gradient(policy, value, c(coef(policy), coef(value)), list(
+    inputs = t(observation), action = action + 1L, advantage = advantage, return = return,
+    log_prob = policy_log_prob(policy, observation, action)
+  ), settings)
+  expect_equal(found$gradient, c(
+    policy_log_prob_gradient(policy, observation, action, -advantage / 10),
+    policy_output_gradient(value, observation, -advantage / 10)
+  ))
+})
+
 test_that("minibatches are nearly equal and have each step once", {
   set.seed(1)
   for (batch in c(7, 64, 1000, Inf)) {

@@ -5,6 +5,7 @@ policies_to_save <- function() {
   network <- policy_network(c(16, 4))
   list(
     network = network,
+    drawing = policy_network(c(16, 4), output = "softmax"),
     random = policy_random(),
     table = function(observation) max.col(table[observation + 1L, , drop = FALSE], "first"),
     glm = as_policy(glm(action ~ position, gaussian, steps)),
