@@ -6,8 +6,7 @@
 #     [methods=METHOD,...] [seeds=N]
 #
 # It takes hours. `seeds` trains only the first of each job. What the tables have already is not
-# trained again, so that it may be stopped at any time; a row that is to be made anew is deleted from
-# both first.
+# trained again, so it may be stopped at any time. To make a row anew, delete it from both first.
 source("tools/processes.R")
 source("tools/solve/jobs.R")
 
