@@ -6,7 +6,7 @@ test_that("the picture shows the density of the returns, each of them, and their
   returns <- c(10, 12, 13, 15, 16, 18, 20, 40)
   picture <- drawn(ggplot2::autoplot(rollout_of(returns)))
   whole <- density(returns, from = 10, to = 40)
-  expect_equal(layers_of(picture, "GeomArea")[[1]][c("x", "y")],
+  expect_equal(layers_of(picture, "GeomDensity")[[1]][c("x", "y")],
                data.frame(x = whole$x, y = whole$y), ignore_attr = TRUE)
   expect_identical(layers_of(picture, "GeomRug")[[1]]$x, returns)
   expect_identical(layers_of(picture, "GeomVline")[[1]]$xintercept, 15.5)
@@ -16,7 +16,7 @@ test_that("the picture shows the density of the returns, each of them, and their
 
 test_that("few different returns have a bar each, as high as the number of their episodes", {
   picture <- drawn(ggplot2::autoplot(rollout_of(rep(c(1.5, -1, 1, 0, -1), 8))))
-  bars <- layers_of(picture, "GeomRect")[[1]]
+  bars <- layers_of(picture, "GeomBar")[[1]]
   expect_equal((bars$xmin + bars$xmax) / 2, c(-1, 0, 1, 1.5))
   expect_equal(bars$ymax, c(16, 8, 8, 8))
   expect_equal(bars$xmax - bars$xmin, rep(0.4, 4))
@@ -24,23 +24,23 @@ test_that("few different returns have a bar each, as high as the number of their
 })
 
 test_that("bars are as few as are twice as many episodes on average, or three", {
-  has_bars <- function(returns) !is.null(returns_plot_data(returns)$bars)
-  expect_true(has_bars(c(9, 20, 31)))
-  expect_false(has_bars(c(9, 20, 31, 40)))
-  expect_true(has_bars(rep(1:10, 2)))
-  expect_false(has_bars(rep(1:11, 9)))
+  expect_true(has_few(c(9, 20, 31)))
+  expect_false(has_few(c(9, 20, 31, 40)))
+  expect_true(has_few(rep(1:10, 2)))
+  expect_false(has_few(rep(1:11, 9)))
 })
 
 test_that("bars near each other are seen, and have the usual marks", {
-  bars <- returns_plot_data(c(rep(500, 20), 499.9, 9))$bars
-  expect_gt(min(bars$xmax - bars$xmin), 4)
-  expect_null(bar_marks(bars))
+  near <- c(rep(500, 20), 499.9, 9)
+  expect_gt(bar_width(near), 4)
+  expect_null(bar_marks(near))
+  drawn(ggplot2::autoplot(rollout_of(near)))
 })
 
 test_that("equal returns, or a single one, have a bar with room beside it", {
   for (returns in list(200, rep(200, 5), 0)) {
     picture <- drawn(ggplot2::autoplot(rollout_of(returns)))
-    bar <- layers_of(picture, "GeomRect")[[1]]
+    bar <- layers_of(picture, "GeomBar")[[1]]
     range <- ggplot2::ggplot_build(picture)$layout$panel_params[[1]]$x.range
     expect_true(range[1] < bar$xmin && bar$xmax < range[2])
   }
