@@ -13,7 +13,6 @@ init_space.gym_space_box <- function(space) {
   if (!length(space$low) %in% c(1, n) || !length(space$high) %in% c(1, n)) {
     abort_answer(paste("A Box of", count_of(n, "number"), "has bounds of another length"))
   }
-  class(space) <- append(class(space), "gym_space_array", 1L)
   space
 }
 
@@ -22,14 +21,12 @@ init_space.gym_space_multidiscrete <- function(space) {
   space$shape <- shape_from_json(space$shape)
   space$nvec <- whole_from_json(space$nvec)
   space$start <- if (is.null(space$start)) 0L * space$nvec else whole_from_json(space$start)
-  class(space) <- append(class(space), "gym_space_array", 1L)
   space
 }
 
 #' @exportS3Method
 init_space.gym_space_multibinary <- function(space) {
   space$shape <- shape_from_json(space$shape)
-  class(space) <- append(class(space), "gym_space_array", 1L)
   space
 }
 

@@ -13,12 +13,7 @@
 batch_space <- function(space, n) UseMethod("batch_space")
 
 #' @exportS3Method
-batch_space.default <- function(space, n) {
-  structure(
-    list(name = "Tuple", spaces = rep(list(space), n)),
-    class = c("gym_space_tuple", "gym_space")
-  )
-}
+batch_space.default <- function(space, n) make_space("Tuple", spaces = rep(list(space), n))
 
 #' @exportS3Method
 batch_space.gym_space_array <- function(space, n) {
@@ -86,23 +81,23 @@ check_value.gym_space_discretes <- function(space, value, path, call, bounds = F
     # As for a single Discrete: `observation[, 3] > 0` is a vector of actions.
     storage.mode(value) <- "integer"
   }
-  quick <- !bounds && length(value) == space$shape && is.null(dim(value)) && all_small(value)
+  quick <- !bounds && length(value) == space$shape && is.null(dim(value)) &&
+    !is.null(small_integers(value))
   if (!quick) {
     check_value.gym_space_array(space, value, path, call, bounds)
   }
 }
 
-# Whether all are whole numbers that fit R's integers, without missing values.
-all_small <- function(x) {
-  if (is.integer(x)) {
-    !is.object(x) && !anyNA(x)
-  } else {
-    is.double(x) && !is.object(x) && within_integer(x) && all(as.integer(x) == x)
+# Whole numbers as R's integers, `NULL` if they do not fit or if there is anything else.
+small_integers <- function(x) {
+  if (is.object(x)) {
+    NULL
+  } else if (is.integer(x) || is.logical(x)) {
+    if (!anyNA(x)) as.integer(x)
+  } else if (is.double(x) && within_integer(x)) {
+    whole <- as.integer(x)
+    if (all(whole == x)) whole
   }
-}
-
-within_integer <- function(x) {
-  isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
 }
 
 # Write numbers that fit R's integers as int32: writing int64 takes ten times as long.

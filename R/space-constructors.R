@@ -69,7 +69,7 @@ space_box <- function(low, high, shape = NULL, dtype = "float64") {
   high_values <- spread_bound(high, shape, dtype)
   check_bounds_order(low_values, high_values)
   space <- make_space(
-    "Box", shape = shape, dtype = dtype, low = low_values, high = high_values, is_array = TRUE
+    "Box", shape = shape, dtype = dtype, low = low_values, high = high_values
   )
   space$names <- names_of_numbers(low, high, shape)
   space
@@ -95,7 +95,7 @@ space_multi_discrete <- function(nvec, start = 0) {
   }
   make_space(
     "MultiDiscrete", shape = shape, dtype = "int64", nvec = narrow_whole(row_major(nvec)),
-    start = narrow_whole(rep_len(row_major(start), length(nvec))), is_array = TRUE
+    start = narrow_whole(rep_len(row_major(start), length(nvec)))
   )
 }
 
@@ -103,7 +103,7 @@ space_multi_discrete <- function(nvec, start = 0) {
 #' @export
 space_multi_binary <- function(shape) {
   check_shape(shape)
-  make_space("MultiBinary", shape = as.integer(shape), dtype = "int8", is_array = TRUE)
+  make_space("MultiBinary", shape = as.integer(shape), dtype = "int8")
 }
 
 #' @rdname space_box
@@ -141,12 +141,7 @@ space_dict <- function(...) {
   make_space("Dict", dtype = NULL, spaces = spaces)
 }
 
-make_space <- function(kind, ..., is_array = FALSE) {
-  structure(
-    list(name = kind, ...),
-    class = c(paste0("gym_space_", lower_case(kind)), if (is_array) "gym_space_array", "gym_space")
-  )
-}
+make_space <- function(kind, ...) structure(list(name = kind, ...), class = space_class(kind))
 
 # Bounds ----------------------------------------------------------------------------
 
@@ -242,8 +237,16 @@ sorted_characters <- function(x, arg = rlang::caller_arg(x), call = rlang::calle
 
 check_spaces <- function(spaces, call = rlang::caller_env()) {
   for (i in seq_along(spaces)) {
-    if (!inherits(spaces[[i]], "gym_space")) {
-      abort_argument(spaces[[i]], "a space", names(spaces)[i] %||% paste0("..", i), call)
-    }
+    check_space(spaces[[i]], names(spaces)[i] %||% paste0("..", i), call)
+  }
+}
+
+check_space <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (!inherits(x, "gym_space")) {
+    gym_abort(
+      c(paste0("`", arg, "` must be a space, not ", describe_argument(x), "."),
+        i = "`space_box()`, `space_discrete()` and others make one."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
   }
 }

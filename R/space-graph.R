@@ -42,24 +42,15 @@ check_value.gym_space_graph <- function(space, value, path, call, bounds = FALSE
   }
   if (!is.null(value$edges)) {
     check_stack(space$edge_space, value$edges, path_key(path, "edges"), call, bounds)
-    check_links(space, value, path, call)
+    links <- stacked_links(stack_length(value$edges), stack_length(value$nodes))
+    check_value(links, value$edge_links, path_key(path, "edge_links"), call, bounds = TRUE)
   }
-}
-
-check_links <- function(space, value, path, call) {
-  links <- stacked_links(stack_length(value$edges), stack_length(value$nodes))
-  check_value(links, value$edge_links, path_key(path, "edge_links"), call, bounds = TRUE)
 }
 
 # The space of edge_links: two nodes per edge.
 stacked_links <- function(edges, nodes) {
-  batch_space(
-    structure(
-      list(name = "Box", dtype = "int64", shape = 2L, low = c(0, 0), high = rep(nodes - 1, 2L)),
-      class = c("gym_space_box", "gym_space_array", "gym_space")
-    ),
-    edges
-  )
+  link <- make_space("Box", dtype = "int64", shape = 2L, low = c(0, 0), high = rep(nodes - 1, 2L))
+  batch_space(link, edges)
 }
 
 #' @exportS3Method

@@ -58,12 +58,7 @@ digits_index <- function(nvec, start, rank) {
 }
 
 #' @exportS3Method
-space_index.gym_space_tuple <- function(space) parts_index(space)
-
-#' @exportS3Method
-space_index.gym_space_dict <- function(space) parts_index(space)
-
-parts_index <- function(space) {
+space_index.gym_space_tuple <- function(space) {
   parts <- lapply(space$spaces, space_index)
   if (any(vapply(parts, is.null, NA))) {
     return(NULL)
@@ -81,6 +76,9 @@ parts_index <- function(space) {
     }
   )
 }
+
+#' @exportS3Method
+space_index.gym_space_dict <- space_index.gym_space_tuple
 
 #' Find the rows of a table for observations
 #' @param index The index of their space.

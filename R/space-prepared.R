@@ -101,16 +101,7 @@ tensors_writer.gym_space_discrete <- function(space, n) {
   if (space$dtype == "uint64") {
     return(tensors_writer.default(space, n))
   }
-  function(values) {
-    if (length(values) != n || !is.null(dim(values)) || is.object(values)) {
-      NULL
-    } else if (is.integer(values) || is.logical(values)) {
-      if (!anyNA(values)) as.integer(values)
-    } else if (is.double(values) && within_integer(values)) {
-      whole <- as.integer(values)
-      if (all(whole == values)) whole
-    }
-  }
+  function(values) if (length(values) == n && is.null(dim(values))) small_integers(values)
 }
 
 # The largest float32. Larger numbers are refused.

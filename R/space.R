@@ -8,11 +8,12 @@ new_space <- function(description) {
   if (!is.list(description) || !rlang::is_string(description$name)) {
     refuse_field(description, "space", "a description with a name")
   }
-  space <- structure(
-    description,
-    class = c(paste0("gym_space_", lower_case(description$name)), "gym_space")
-  )
-  init_space(space)
+  init_space(structure(description, class = space_class(description$name)))
+}
+
+space_class <- function(kind) {
+  array <- if (kind %in% c("Box", "MultiDiscrete", "MultiBinary")) "gym_space_array"
+  c(paste0("gym_space_", lower_case(kind)), array, "gym_space")
 }
 
 init_space <- function(space) UseMethod("init_space")
@@ -133,15 +134,13 @@ space_sample <- function(space) UseMethod("space_sample")
 
 #' @export
 space_sample.default <- function(space) {
-  abort_argument(space, "a space", "space", rlang::caller_env())
+  check_space(space, call = rlang::caller_env())
 }
 
 #' @rdname space_sample
 #' @export
 space_contains <- function(space, value) {
-  if (!inherits(space, "gym_space")) {
-    abort_argument(space, "a space", "space", rlang::current_env())
-  }
+  check_space(space)
   fits_space(space, value, bounds = TRUE)
 }
 

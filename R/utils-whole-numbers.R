@@ -23,7 +23,11 @@ whole_from_digits <- function(digits) {
 }
 
 narrow_whole <- function(numbers) {
-  if (all(abs(numbers) <= .Machine$integer.max)) as.integer(numbers) else numbers
+  if (within_integer(numbers)) as.integer(numbers) else as.numeric(numbers)
+}
+
+within_integer <- function(x) {
+  isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
 }
 
 integers_beyond_double <- function(digits,
@@ -114,7 +118,10 @@ narrow_integer64 <- function(x) {
 
 # The same for all numbers of a value that may be a list or a data frame.
 narrow_values <- function(x, narrow = narrow_integer64) {
-  if (is.list(x) && (!is.object(x) || is.data.frame(x))) {
+  # In each step, so the usual case is fast.
+  if (!is.object(x) && !is.list(x)) {
+    x
+  } else if (is.list(x) && (!is.object(x) || is.data.frame(x))) {
     x[] <- lapply(x, narrow_values, narrow)
     x
   } else {
