@@ -256,20 +256,11 @@ independent_sub_envs <- function(env) {
   )
 }
 
-# Makes the function `step_bare()` of sub-environments that rest after their last episode.
+# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those
+# that were stepped before are stepped along, and their results ignored: another set needs a new
+# request, which takes time to prepare. When fewer than half of them still play, the others are left
+# out.
 bare_stepper <- function(env) {
-  choose <- step_chooser(env)
-  function(action, which) {
-    step <- choose(action, which)
-    out <- take_step(env, step$n, step$action, step$which, finals = FALSE)
-    if (is.null(step$row)) out else rows_of_step(env$single_observation_space, out, step$row)
-  }
-}
-
-# Makes a function that decides which sub-environments are stepped. Those that were stepped before
-# are stepped along, and their results ignored: another set needs a new request, which takes time to
-# prepare. When fewer than half of them still play, the others are left out.
-step_chooser <- function(env) {
   n <- env$num_envs
   actions <- env$single_action_space
   stepped <- NULL
@@ -281,10 +272,9 @@ step_chooser <- function(env) {
     }
     count <- length(stepped)
     along <- length(which) < count
-    list(
-      action = if (along) actions_of_all(actions, action, row, count) else action,
-      which = if (count < n) stepped, n = count, row = if (along) row
-    )
+    if (along) action <- actions_of_all(actions, action, row, count)
+    out <- take_step(env, count, action, if (count < n) stepped, finals = FALSE)
+    if (along) rows_of_step(env$single_observation_space, out, row) else out
   }
 }
 
@@ -306,20 +296,16 @@ joint_sub_envs <- function(env) {
   n <- env$num_envs
   observed <- env$single_observation_space
   actions <- env$single_action_space
-  rows <- function(out, which) {
-    out <- out[c("observation", "reward", "terminated", "truncated", "next_observation")]
-    if (length(which) == n) {
-      return(out)
-    }
-    rows_of_step(observed, out, which)
-  }
   list(
     observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,
     reset = function(seeds, which = NULL) first_observation(env, seeds),
     step = function(action, which) {
       out <- take_step(env, n, actions_of_all(actions, action, which, n))
       out$next_observation <- out$next_observation %||% out$observation
-      rows(out, which)
+      if (length(which) < n) {
+        return(rows_of_step(observed, out, which))
+      }
+      out[c("observation", "reward", "terminated", "truncated", "next_observation")]
     }
   )
 }

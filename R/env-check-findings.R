@@ -62,16 +62,13 @@ note_finding <- function(check, topic, finding, key = finding, severity = "wrong
   }
 }
 
-# The elements of an object that may not be an environment of this package, whose `$` aborts for a
-# missing element.
-members_of <- function(env) {
-  names <- c("observation_space", "action_space", "reset", "step", "spec")
-  stats::setNames(lapply(names, function(name) env[[name]]), names)
-}
-
 # Returns whether the environment can be played at all.
 look_at_members <- function(check) {
-  members <- members_of(check$env)
+  # `$` of an environment of this package aborts for a missing element.
+  members <- sapply(
+    c("observation_space", "action_space", "reset", "step", "spec"),
+    function(name) check$env[[name]], simplify = FALSE
+  )
   for (name in c("reset", "step")) {
     if (!is.function(members[[name]])) {
       note_finding(check, name, paste0("The environment has no function `", name, "()`."))
@@ -242,18 +239,11 @@ look_at_render <- function(check, seed) {
   }
   env$reset(seed = seed)
   # Discard plots.
-  before <- grDevices::dev.cur()
-  grDevices::pdf(NULL)
-  device <- grDevices::dev.cur()
-  on.exit({
-    grDevices::dev.off(device)
-    if (before > 1L) grDevices::dev.set(before)
-  })
-  call_and_look(check, "render", "`render()`", env$render())
+  on_device(grDevices::pdf(NULL), call_and_look(check, "render", "`render()`", env$render()))
 }
 
 can_be_drawn <- function(env) {
-  if (inherits(env, "gym_server_env")) {
+  if (is_server_env(env)) {
     known_instance(env$client, env$instance_id)$draws
   } else {
     is.function(env[["render"]])

@@ -52,7 +52,7 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   check_count(max_steps)
   check_seed(seed, min = 0)
   id <- env
-  if (is.character(env) || inherits(env, "gym_wrapped")) {
+  if (is_given_by_id(env)) {
     check_environment(env)
     env <- gym_make(env, ..., seed = seed, client = client)
     on.exit(close_quietly(env))

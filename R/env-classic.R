@@ -84,7 +84,7 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
   check_not_registered(env_id)
   check_named_list(kwargs)
   kwargs <- with_random_map(env_id, kwargs, seed)
-  create_and_watch(
+  create_instance(
     x, env_id, seed, render_mode, kwargs, wrappers, num_envs, vectorization_mode, autoreset_mode,
     name, num_workers
   )

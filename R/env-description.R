@@ -50,15 +50,12 @@ how_made <- function() {
 }
 
 # Whether it is given by an id that a server knows.
-is_made_by_server <- function(env) {
-  (is.character(env) || inherits(env, "gym_wrapped")) && !is_registered(env)
-}
+is_made_by_server <- function(env) is_given_by_id(env) && !is_registered(env)
 
 ask_description <- function(client, env_id, arguments, call) {
-  id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
   wrappers <- noted_wrappers(env_id)
   fields <- c(
-    env_id = json_string(id), kwargs = if (length(arguments)) to_json(arguments),
+    env_id = json_string(bare_id(env_id)), kwargs = if (length(arguments)) to_json(arguments),
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
   )
   answer <- tryCatch(
@@ -109,6 +106,6 @@ check_description <- function(answer) {
   check_optional(answer, "spec", is_object, "an object")
   check_optional(answer, "group", is_natural, "a whole number")
   check_optional(answer, "processes", is_natural, "a whole number")
-  check_optional(answer, "needs_max_steps", is_flag, "true or false")
+  check_optional(answer, "needs_max_steps", rlang::is_bool, "true or false")
   check_optional(answer$spec, "max_episode_steps", is_number, "a number")
 }

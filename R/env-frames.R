@@ -44,7 +44,7 @@ check_draws <- function(env, call) {
     )
   }
   draws <- FALSE
-  if (inherits(env, "gym_server_env")) {
+  if (is_server_env(env)) {
     check_open(env, call)
     draws <- known_instance(env$client, env$instance_id, call = call)$draws
   }

@@ -4,10 +4,8 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
                             num_workers = NULL, call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
-  if (inherits(env_id, "gym_wrapped")) {
-    wrappers <- c(env_id$wrappers, wrappers)
-    env_id <- env_id$env_id
-  }
+  wrappers <- c(noted_wrappers(env_id), wrappers)
+  env_id <- bare_id(env_id)
   check_no_transforms(wrappers, call)
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
@@ -41,6 +39,9 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
     instances[[instance_id]] <- new_instance(client, instance_id, answer)
   } else if (isTRUE(client_state(client)$classic)) {
     check_classic_fields(client, fields, c("env_id", "seed"), call)
+  }
+  if (identical(render_mode, "human")) {
+    watch_once(known_instance(client, instance_id, call), call)
   }
   ready <- TRUE
   instance_id
@@ -78,8 +79,14 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   check_client(client, "x", call)
   check_string(instance_id, call = call)
   instances <- client_state(client)$instances
-  instances[[instance_id]] %||%
-    (instances[[instance_id]] <- ask_instance(client, instance_id, call))
+  if (is.null(instances[[instance_id]])) {
+    answer <- tryCatch(
+      get_answer(client, instance_route(instance_id), call = call),
+      gym_error_http_404 = function(cnd) classic_description(client, instance_id, cnd, call)
+    )
+    instances[[instance_id]] <- new_instance(client, instance_id, answer)
+  }
+  instances[[instance_id]]
 }
 
 # Calling handlers, such as those of read_values(), do not run after a stack overflow.
@@ -89,14 +96,6 @@ read_space <- function(answer, name, space_of) {
     read_values(space_of(answer[[name]]), what),
     stackOverflowError = function(cnd) abort_answer(paste(what, "is nested too deeply"))
   )
-}
-
-ask_instance <- function(client, instance_id, call) {
-  answer <- tryCatch(
-    get_answer(client, instance_route(instance_id), call = call),
-    gym_error_http_404 = function(cnd) classic_description(client, instance_id, cnd, call)
-  )
-  new_instance(client, instance_id, answer)
 }
 
 # Makes an instance from the server's description, after creating it or on request.
@@ -190,11 +189,4 @@ encode_seed_lists <- function(seeds, num_envs, call) {
   json_array(vapply(seeds, function(one) {
     if (is_none(one)) "null" else json_array(whole_text(one))
   }, ""))
-}
-
-encode_options <- function(options, call) {
-  if (!is.null(options)) {
-    check_named_list(options, call = call)
-    to_json(options)
-  }
 }

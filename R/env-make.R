@@ -121,13 +121,13 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   kwargs <- with_random_map(env_id, kwargs, seed)
   check_wrappers(wrappers, call = call)
   wrappers <- split_wrappers(c(noted_wrappers(env_id), wrappers), call)
-  if (inherits(env_id, "gym_wrapped")) env_id <- env_id$env_id
+  env_id <- bare_id(env_id)
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
   # No interrupt may come between creating the instance and storing its id.
   suspendInterrupts(instance_id <- allowInterrupts(withCallingHandlers(
-    create_and_watch(
+    create_instance(
       client, env_id, seed, render_mode, kwargs, wrappers$server, num_envs, vectorization_mode,
       autoreset_mode, name, num_workers, call = call
     ),
@@ -152,12 +152,10 @@ explain_unknown_argument <- function(cnd, given, call) {
   }
   # The last one is an argument of all environments.
   choices <- c(setdiff(names(formals(gym_make)), c("env_id", "...")), "max_episode_steps")
-  near <- nearest_name(name, choices)
   gym_abort(
     c(
       paste0("Neither `gym_make()` nor the environment has an argument `", name, "`."),
-      i = if (length(near)) paste0("Did you mean `", near, "`?"),
-      i = if (!length(near)) "See the environment's documentation for its arguments."
+      i = did_you_mean(name, choices) %||% "See the environment's documentation for its arguments."
     ),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
     status = cnd$status, code = cnd$code, argument = name, call = call
@@ -268,11 +266,10 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
     return(NULL)
   }
   members <- setdiff(ls(x), c("initialize", "print"))
-  near <- nearest_name(name, members)
   gym_abort(
     c(
       paste0("An environment has no `$", name, "`."),
-      i = if (length(near)) paste0("Did you mean `$", near, "`?"),
+      i = did_you_mean(name, members, "`$%s`"),
       i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), ".")
     ),
     class = "gym_error_argument", argument = name, call = call

@@ -7,14 +7,6 @@ plotted_size <- c(width = 600L, height = 400L)
 # A small picture, such as one pixel for each cell of a grid, is enlarged to about this width.
 least_width <- 240L
 
-render_r_env <- function(sub_env, call = rlang::caller_env()) {
-  check_sub_env_open(sub_env, call)
-  check_was_reset(sub_env, call)
-  check_renders(sub_env, call)
-  drawn <- draw_sub_env(sub_env, call)
-  if (is.raw(drawn)) frame_from_png(drawn) else drawn
-}
-
 check_renders <- function(sub_env, call = rlang::caller_env()) {
   if (is.null(sub_env$render)) {
     gym_abort(
@@ -28,7 +20,11 @@ check_renders <- function(sub_env, call = rlang::caller_env()) {
 # The current frame as the bytes of a PNG file.
 sub_env_png <- function(sub_env, call = rlang::caller_env()) {
   drawn <- draw_sub_env(sub_env, call)
-  if (is.raw(drawn)) drawn else png_from_frame(drawn)
+  if (is.raw(drawn)) {
+    return(drawn)
+  }
+  check_suggested("png", "keep frames", call)
+  png::writePNG(unclass(drawn) / 255)
 }
 
 #' Call the user's function that draws
@@ -39,7 +35,7 @@ draw_sub_env <- function(sub_env, call) {
   bytes <- plot_as_png(plotted_size, {
     picture <- withCallingHandlers(
       keep_random_state(sub_env$render()),
-      error = function(cnd) abort_render(cnd, sub_env, call)
+      error = function(cnd) abort_raised(cnd, sub_env, NULL, call, "render")
     )
   })
   if (is_picture(picture)) {
@@ -56,31 +52,27 @@ draw_sub_env <- function(sub_env, call) {
   }
 }
 
-abort_render <- function(cnd, sub_env, call) {
-  gym_abort(
-    paste0("`render()` of ", sub_env$traits$spec$id, " raised an error."),
-    class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
-              "gym_error_environment"),
-    env_id = sub_env$traits$spec$id, call = call, parent = cnd
-  )
+# Runs code that plots on the device that `open` opens. The current device stays current.
+on_device <- function(open, code) {
+  before <- grDevices::dev.cur()
+  open
+  device <- grDevices::dev.cur()
+  on.exit({
+    grDevices::dev.off(device)
+    if (before > 1L) grDevices::dev.set(before)
+  })
+  code
 }
 
 #' Run code that plots, on a device that writes a PNG file
 #'
-#' The current device stays current.
 #' @param size Width and height in pixels.
 #' @return The bytes of the file, `NULL` if nothing was plotted.
 #' @noRd
 plot_as_png <- function(size, code) {
   file <- temporary_file(fileext = ".png")
   on.exit(unlink(file))
-  before <- grDevices::dev.cur()
-  grDevices::png(file, size[[1L]], size[[2L]], res = 96)
-  device <- grDevices::dev.cur()
-  tryCatch(code, finally = {
-    grDevices::dev.off(device)
-    if (before > 1L) grDevices::dev.set(before)
-  })
+  on_device(grDevices::png(file, size[[1L]], size[[2L]], res = 96), code)
   if (file.exists(file)) readBin(file, "raw", file.size(file))
 }
 
@@ -101,7 +93,7 @@ frame_from_picture <- function(picture, sub_env, call) {
       channels <- grDevices::col2rgb(colours)
       new_frame(aperm(array(channels, c(3L, dim(colours))), c(2L, 3L, 1L)))
     },
-    error = function(cnd) abort_render(cnd, sub_env, call)
+    error = function(cnd) abort_raised(cnd, sub_env, NULL, call, "render")
   )
 }
 
@@ -119,9 +111,4 @@ as_colours <- function(picture) {
 enlarge <- function(pixels) {
   by <- ceiling(least_width / ncol(pixels))
   pixels[rep(seq_len(nrow(pixels)), each = by), rep(seq_len(ncol(pixels)), each = by), drop = FALSE]
-}
-
-png_from_frame <- function(frame) {
-  check_suggested("png", "keep frames")
-  png::writePNG(unclass(frame) / 255)
 }

@@ -76,11 +76,10 @@ reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number =
 #' @param action One checked action, or a batch of them for a vectorised environment.
 #' @return The result of the user's `step()`, unchecked.
 #' @noRd
-raw_step <- function(sub_env, action, sub_env_number = NULL, call = rlang::caller_env()) {
-  check_was_reset(sub_env, call)
+raw_step <- function(sub_env, action, call) {
   out <- withCallingHandlers(
     with_generator(sub_env$generator, sub_env$step(action)),
-    error = function(cnd) abort_raised(cnd, sub_env, sub_env_number, call)
+    error = function(cnd) abort_raised(cnd, sub_env, NULL, call)
   )
   sub_env$taken <- sub_env$taken + 1L
   out
@@ -98,20 +97,19 @@ check_was_reset <- function(sub_env, call) {
 
 #' Report an error in the user's function, with its place
 #'
-#' The error keeps its classes, so that users can catch it by them.
+#' @param method Which of the user's functions raised it.
 #' @noRd
-abort_raised <- function(cnd, sub_env, sub_env_number, call) {
+abort_raised <- function(cnd, sub_env, sub_env_number, call,
+                         method = if (is.na(sub_env$taken)) "reset" else "step") {
   # A wrapper's error already says what went wrong.
   if (inherits(cnd, "gym_error_wrapper")) return(invisible())
-  taken <- sub_env$taken
-  where <- if (is.na(taken)) "`reset()` of " else "`step()` of "
-  at <- if (!is.na(taken)) paste0(" in step ", taken + 1L, " of the episode")
+  id <- sub_env$traits$spec$id
+  step <- if (method == "step") sub_env$taken + 1L
+  at <- if (!is.null(step)) paste0(" in step ", step, " of the episode")
   in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
   gym_abort(
-    paste0(where, sub_env$traits$spec$id, " raised an error", at, in_sub_env, "."),
-    class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
-              "gym_error_environment"),
-    env_id = sub_env$traits$spec$id, step = if (!is.na(taken)) taken + 1L,
-    sub_env = sub_env_number, call = call, parent = cnd
+    paste0("`", method, "()` of ", id, " raised an error", at, in_sub_env, "."),
+    class = c(own_classes(cnd), "gym_error_environment"),
+    env_id = id, step = step, sub_env = sub_env_number, call = call, parent = cnd
   )
 }

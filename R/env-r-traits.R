@@ -10,8 +10,8 @@
 #' @noRd
 new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
                        reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
-  check_is_space(observation_space, call = call)
-  check_is_space(action_space, call = call)
+  check_space(observation_space, call = call)
+  check_space(action_space, call = call)
   check_string(id, call = call)
   check_count(max_episode_steps, allow_null = TRUE, call = call)
   check_number(reward_threshold, allow_null = TRUE, call = call)
@@ -39,16 +39,6 @@ change_traits <- function(traits, changes) {
   traits
 }
 
-check_is_space <- function(x, arg = rlang::caller_arg(x), call) {
-  if (!inherits(x, "gym_space")) {
-    gym_abort(
-      c(paste0("`", arg, "` must be a space, not ", describe_argument(x), "."),
-        i = "`space_box()`, `space_discrete()` and others make one."),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
-  }
-}
-
 loosen_boxes <- function(space) {
   if (inherits(space, "gym_space_box")) {
     space$low <- ifelse(is.finite(space$low), -.Machine$double.xmax, space$low)
@@ -61,14 +51,19 @@ loosen_boxes <- function(space) {
 
 # Actions and observations ------------------------------------------------------------
 
-#' Check the actions of several sub-environments
-#' @param which The numbers of these sub-environments.
+#' Check actions and give them the form that the user's functions get
+#' @param which The numbers of the sub-environments that take them, `NULL` for a single action.
 #' @noRd
-check_actions <- function(traits, action, which, call) {
-  n <- length(which)
-  if (!traits$fits_actions(action, n)) {
-    rules <- traits$action_rules
-    check_batch(rules, batch_space(rules, n), action, n, call, which, bounds = TRUE)
+checked_action <- function(traits, action, which, call) {
+  rules <- traits$action_rules
+  n <- if (!is.null(which)) length(which)
+  if (!fits_quickly(rules, action, n, traits$fits_actions)) {
+    check_values(rules, action, n, call, which)
+  }
+  if (is.null(n)) {
+    tidy_value(traits$action_space, action, NULL)
+  } else {
+    tidy_actions(traits$action_space, action)
   }
 }
 
@@ -82,9 +77,6 @@ tidy_value <- function(space, value, n) {
   if (inherits(space, "gym_space_discrete")) {
     return(narrow_if_double(value))
   }
-  if (has_parts(space)) {
-    return(name_parts(space, map_parts(space, tidy_value, in_order(space, value), list(n))))
-  }
   if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
     if (is.null(n)) {
       dim(value) <- NULL
@@ -94,22 +86,16 @@ tidy_value <- function(space, value, n) {
       columns <- if (!is.null(space$names)) list(NULL, space$names)
       if (!identical(dimnames(value), columns)) dimnames(value) <- columns
     }
+  } else if (has_parts(space)) {
+    value <- map_parts(space, tidy_value, in_order(space, value), list(n))
+    if (!is.null(space$names)) names(value) <- space$names
   }
   value
 }
 
-name_parts <- function(space, parts) {
-  if (!is.null(space$names)) {
-    names(parts) <- space$names
-  }
-  parts
-}
-
 narrow_if_double <- function(x) {
-  if (is.object(x) || is.integer(x)) unname(x) else as_integer_if_small(x)
+  if (is.object(x) || is.integer(x)) unname(x) else narrow_whole(x)
 }
-
-as_integer_if_small <- function(x) if (within_integer(x)) as.integer(x) else as.numeric(x)
 
 #' Make a function that takes one action from a checked batch
 #' @noRd

@@ -31,21 +31,20 @@ wrap_transform_reward <- function(traits, func, call) {
     as.numeric(reward)
   }
   around <- function(inner, n, next_step) {
-    seen <- if (transform$asks("observation")) observation_memory(traits, n)
+    seen <- observation_memory(transform, traits, n)
     # With autoreset_mode "NextStep" the step after the end of an episode only resets.
     ended <- logical(n)
     list(
       reset = function(..., mask = NULL) {
         observation <- inner$reset(..., mask = mask)
         if (next_step) ended[mask %||% TRUE] <<- FALSE
-        if (!is.null(seen)) seen$note(observation)
-        observation
+        seen$note(observation)
       },
       step = function(action, which = NULL, ..., finals = TRUE) {
         finals <- finals || transform$asks("next_observation")
-        before <- if (!is.null(seen)) seen$rows(which)
+        before <- seen$rows(which)
         out <- inner$step(action, which = which, ..., finals = finals)
-        if (!is.null(seen)) seen$note(out$observation, which)
+        seen$note(out$observation, which)
         reward <- transform$ask(list(
           reward = out$reward, observation = before, action = action,
           next_observation = out$next_observation %||% out$observation,
@@ -126,19 +125,15 @@ wrap_transform_action <- function(traits, func, action_space = NULL, call) {
     tidy_actions(inside, action)
   }
   around <- function(inner, n, ...) {
-    seen <- if (transform$asks("observation")) observation_memory(traits, n)
-    note <- function(observation, which = NULL) {
-      if (!is.null(seen)) seen$note(observation, which)
-      observation
-    }
+    seen <- observation_memory(transform, traits, n)
     list(
-      reset = function(...) note(inner$reset(...)),
+      reset = function(...) seen$note(inner$reset(...)),
       step = function(action, which = NULL, ...) {
-        before <- if (!is.null(seen)) seen$rows(which)
+        before <- seen$rows(which)
         count <- if (is.null(which)) n else length(which)
         action <- transform$ask(list(action = action, observation = before), count, fit)
         out <- inner$step(action, which = which, ...)
-        note(out$observation, which)
+        seen$note(out$observation, which)
         out
       }
     )
@@ -146,17 +141,22 @@ wrap_transform_action <- function(traits, func, action_space = NULL, call) {
   list(traits = changed, around = around_batches(traits, changed, around))
 }
 
-# The last observation of each sub-environment, before the next action.
-observation_memory <- function(traits, n) {
+# The last observation of each sub-environment, before the next action, if the function asks for it.
+observation_memory <- function(transform, traits, n) {
+  asked <- transform$asks("observation")
   space <- traits$observation_space
   seen <- NULL
   list(
     note = function(observation, which = NULL) {
-      seen <<- if (is.null(which)) observation else replace_rows(space, seen, n, which, observation)
+      if (asked) {
+        some <- !is.null(which)
+        seen <<- if (some) replace_rows(space, seen, n, which, observation) else observation
+      }
+      observation
     },
     rows = function(which) {
-      if (is.null(seen)) check_was_reset(list(taken = NA, traits = traits), NULL)
-      if (is.null(which)) seen else batch_rows(space, seen, which)
+      if (asked && is.null(seen)) check_was_reset(list(taken = NA, traits = traits), NULL)
+      if (is.null(which) || !asked) seen else batch_rows(space, seen, which)
     }
   )
 }
@@ -194,10 +194,8 @@ convert_functions <- function(inner, observation, action) {
   force(inner)
   list(
     reset = function(...) observation(inner$reset(...)),
-    step = function(...) {
-      arguments <- list(...)
-      arguments[[1L]] <- action(arguments[[1L]])
-      out <- do.call(inner$step, arguments)
+    step = function(taken, ...) {
+      out <- inner$step(action(taken), ...)
       out$observation <- observation(out$observation)
       out
     }
@@ -259,9 +257,7 @@ new_transform <- function(wrapper, func, traits, call) {
     value <- tryCatch(eval(asking, parts, baseenv()), error = function(cnd) {
       abort_transform(
         transform, paste0("raised an error", if (n == 1L) " for a batch of one row"),
-        class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
-                  "gym_error_environment"),
-        parent = cnd
+        class = c(own_classes(cnd), "gym_error_environment"), parent = cnd
       )
     })
     fit(narrow_values(value), n)

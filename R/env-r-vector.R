@@ -96,8 +96,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
     step = function(action, which = all) {
       call <- rlang::current_env()
       which <- which %||% all
-      check_actions(traits, action, which, call)
-      action <- tidy_actions(traits$action_space, action)
+      action <- checked_action(traits, action, which, call)
       stepping <- sub_envs[which]
       taken <- vapply(stepping, function(sub_env) sub_env$taken, 0L) + 1L
       if (anyNA(taken)) {
@@ -185,7 +184,7 @@ is_right_step <- function(out, traits) {
   is.double(reward) && length(reward) == 1L && !is.na(reward) && (isTRUE(flag) || isFALSE(flag)) &&
     (is.null(out$truncated) || isTRUE(out$truncated) || isFALSE(out$truncated)) &&
     is.null(out$info) && !is.object(out$observation) &&
-    fits_quickly(traits, out$observation, NULL)
+    fits_quickly(traits$observation_space, out$observation, NULL, traits$fits_observations)
 }
 
 # Adds the place to an error of a step.
@@ -301,10 +300,10 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
     step = function(action, which = seq_len(num_envs)) {
       call <- rlang::current_env()
       which <- which %||% seq_len(num_envs)
-      check_actions(traits, action, which, call)
-      action <- tidy_actions(traits$action_space, action)
+      check_was_reset(sub_env, call)
+      action <- checked_action(traits, action, which, call)
       action <- actions_of_all(traits$action_space, action, which, num_envs)
-      out <- raw_step(sub_env, action, call = call)
+      out <- raw_step(sub_env, action, call)
       some <- length(which) < num_envs
       if (some) out <- without_ended(out, traits$observation_space, which, num_envs)
       out <- complete_step(out, sub_env, call = call)

@@ -12,6 +12,11 @@
 #' @return A new environment with the same functions.
 #' @noRd
 wrap_r_env <- function(env, wrapper, arguments, call) {
+  if (!inherits(env, "gym_r_env")) {
+    must <- paste("the id of an environment, or one made by `gym_make()`, by `gym_env()` or of a",
+                  "class that inherits from `GymEnv`")
+    abort_argument(env, must, "env_id", call)
+  }
   sub_env <- sub_env_of(env)
   made <- make_r_wrapper(sub_env$traits, wrapper, arguments, call)
   made$traits$spec$wrappers <- c(made$traits$spec$wrappers, wrapper)
@@ -27,14 +32,6 @@ wrap_r_env <- function(env, wrapper, arguments, call) {
     # A wrapper may change the transitions of the model.
     definition["model"] <- list(NULL)
     function_env$new(definition)
-  }
-}
-
-check_wrappable <- function(env, call) {
-  if (!inherits(env, "gym_r_env")) {
-    must <- paste("the id of an environment, or one made by `gym_make()`, by `gym_env()` or of a",
-                  "class that inherits from `GymEnv`")
-    abort_argument(env, must, "env_id", call)
   }
 }
 
@@ -175,7 +172,7 @@ wrap_normalize_observation <- function(traits, epsilon = 1e-8, call) {
   if (!is_stackable(space)) {
     abort_wrapped("NormalizeObservation", "observations that are numbers", space, call)
   }
-  check_epsilon(epsilon, call)
+  check_above_zero(epsilon, call = call)
   shape <- space$shape %||% integer()
   size <- prod(shape)
   outside <- space_box(-Inf, Inf, shape)
@@ -203,7 +200,7 @@ wrap_normalize_observation <- function(traits, epsilon = 1e-8, call) {
 
 wrap_normalize_reward <- function(traits, gamma = 0.99, epsilon = 1e-8, call) {
   check_number(gamma, min = 0, max = 1, call = call)
-  check_epsilon(epsilon, call)
+  check_above_zero(epsilon, call = call)
   list(traits = traits, around = function(inner, num_envs) {
     n <- num_envs %||% 1L
     moments <- running_moments(1L)
@@ -287,13 +284,6 @@ abort_wrapped <- function(wrapper, must, space, call) {
     paste0(wrapper, " is for ", must, ", and these are ", format(space), "."),
     class = "gym_error_argument", argument = "wrapper", value = space, call = call
   )
-}
-
-check_epsilon <- function(epsilon, call) {
-  check_number(epsilon, call = call)
-  if (epsilon <= 0) {
-    abort_argument(epsilon, "a number above 0", "epsilon", call)
-  }
 }
 
 # Scales --------------------------------------------------------------------------------

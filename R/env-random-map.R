@@ -22,7 +22,7 @@ with_random_map <- function(env, arguments, seed) {
 
 # By default FrozenLake has a map with a name.
 wants_random_map <- function(env, arguments) {
-  id <- if (inherits(env, "gym_wrapped")) env$env_id else env
+  id <- bare_id(env)
   rlang::is_string(id) && grepl("^FrozenLake", id) && "map_name" %in% names(arguments) &&
     is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
 }

@@ -68,10 +68,9 @@ gym_unregister <- function(id) {
   check_string(id)
   known <- names(the_session$environments)
   if (!id %in% known) {
-    near <- if (length(known)) nearest_name(id, known)
     gym_abort(
       c(paste0("No environment written in R is registered as \"", id, "\"."),
-        i = if (length(near)) paste0("Did you mean \"", near, "\"?")),
+        i = did_you_mean(id, known, "\"%s\"")),
       class = "gym_error_argument", argument = "id", value = id
     )
   }
@@ -97,7 +96,7 @@ check_entry_point <- function(entry_point, call = rlang::caller_env()) {
 
 # Whether the id is registered in this session, which a server cannot know.
 is_registered <- function(x) {
-  id <- if (inherits(x, "gym_wrapped")) x$env_id else x
+  id <- bare_id(x)
   rlang::is_string(id) && id %in% names(the_session$environments)
 }
 
@@ -108,19 +107,11 @@ is_registered <- function(x) {
 #' @param arguments The arguments of `entry_point`, and `max_episode_steps`, -1 for no limit.
 #' @noRd
 make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
-  if (!inherits(id, "gym_wrapped")) {
-    return(make_entry(id, arguments, call))
-  }
-  env <- make_entry(id$env_id, arguments, call)
-  for (wrapper in id$wrappers) {
-    env <- wrap_if_r_env(env, wrapper, call)
+  env <- make_entry(bare_id(id), arguments, call)
+  for (wrapper in noted_wrappers(id)) {
+    env <- wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
   }
   env
-}
-
-wrap_if_r_env <- function(env, wrapper, call) {
-  check_wrappable(env, call)
-  wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
 }
 
 make_entry <- function(id, arguments, call) {
@@ -195,11 +186,9 @@ check_parameters <- function(given, definition, id, call = rlang::caller_env()) 
 
 refuse_argument <- function(strange, known, id, from, call) {
   if (length(strange)) {
-    near <- if (length(known)) nearest_name(strange[[1L]], known)
     gym_abort(
       c(paste0(id, " has no argument `", strange[[1L]], "`."),
-        i = if (length(near)) paste0("Did you mean `", near, "`?"),
-        i = if (!length(near)) paste0("Its arguments are ", from, ".")),
+        i = did_you_mean(strange[[1L]], known) %||% paste0("Its arguments are ", from, ".")),
       class = "gym_error_argument", argument = strange[[1L]], call = call
     )
   }
@@ -280,11 +269,12 @@ registered_rows <- function(search = NULL) {
     ids <- ids[grepl(lower_case(search), lower_case(ids), fixed = TRUE)]
   }
   specs <- lapply(ids, registered_spec)
+  is_vectorized <- function(registered) isTRUE(definition_of(registered$entry_point)$vectorized)
   data.frame(
     id = ids,
     max_episode_steps = vapply(specs, function(spec) spec$max_episode_steps %||% NA_integer_, 0L),
     reward_threshold = vapply(specs, function(spec) as.numeric(spec$reward_threshold %||% NA), 0),
-    vectorised = vapply(ids, is_vectorized_entry, NA, USE.NAMES = FALSE),
+    vectorised = vapply(the_session$environments[ids], is_vectorized, NA, USE.NAMES = FALSE),
     extra = rep(NA_character_, length(ids)),
     available = rep(TRUE, length(ids)),
     reason = rep(NA_character_, length(ids))
@@ -300,15 +290,10 @@ registered_spec <- function(id) {
   spec
 }
 
-is_vectorized_entry <- function(id) {
-  entry_point <- the_session$environments[[id]]$entry_point
-  inherits(entry_point, "gym_function_env") && definition_of(entry_point)$vectorized
-}
-
 # A server has no access to an environment written in R.
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
-    id <- if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
+    id <- bare_id(env_id)
     gym_abort(
       c(paste0(id, " is an environment written in R, which a server cannot make."),
         i = paste0("`gym_make(\"", id, "\")` makes it here.")),

@@ -92,7 +92,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   }
   fields <- c(value = json)
   answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
-  if (!is_flag(answer$member)) {
+  if (!rlang::is_bool(answer$member)) {
     refuse_field(answer$member, "member", "true or false")
   }
   answer$member
@@ -108,7 +108,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
 #' @noRd
 known_spaces <- function(env, client, call = rlang::caller_env()) {
   check_environment(env, call = call)
-  if (is.character(env) || inherits(env, "gym_wrapped")) {
+  if (is_given_by_id(env)) {
     env <- gym_make(env, client = client)
     on.exit(close_quietly(env))
   }

@@ -85,29 +85,35 @@ step_place <- function(sub_env, sub_env_number = NULL) {
 #' @noRd
 checked_observation <- function(traits, observation, n, where, call) {
   space <- traits$observation_space
-  if (!fits_quickly(traits, observation, n)) {
+  if (!fits_quickly(space, observation, n, traits$fits_observations)) {
     tryCatch(
-      if (is.null(n)) {
-        check_value(space, observation, "", NULL, bounds = TRUE)
-      } else {
-        check_batch(space, batch_space(space, n), observation, n, NULL, seq_len(n), bounds = TRUE)
-      },
+      check_values(space, observation, n, NULL),
       gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
   tidy_value(space, observation, n)
 }
 
-# Whether it fits, as is usual; a single observation is checked as a batch of one.
-fits_quickly <- function(traits, observation, n) {
+# Whether a value or a batch of `n` fits, as is usual. `fits` checks batches: a single value is
+# checked as a batch of one.
+fits_quickly <- function(space, value, n, fits) {
   if (is.null(n)) {
-    if (!length(observation) || !is.atomic(observation) || !is.null(dim(observation))) {
+    if (!length(value) || !is.atomic(value) || !is.null(dim(value))) {
       return(FALSE)
     }
     n <- 1L
-    if (length(traits$observation_space$shape) == 1L) dim(observation) <- c(n, length(observation))
+    if (length(space$shape) == 1L) dim(value) <- c(n, length(value))
   }
-  traits$fits_observations(observation, n)
+  fits(value, n)
+}
+
+# Checks a value, or with `n` a batch, whose sub-environments are `which`.
+check_values <- function(space, value, n, call, which = seq_len(n)) {
+  if (is.null(n)) {
+    check_value(space, value, "", call, bounds = TRUE)
+  } else {
+    check_batch(space, batch_space(space, n), value, n, call, which, bounds = TRUE)
+  }
 }
 
 refuse_observation <- function(cnd, space, where, call) {
@@ -157,9 +163,10 @@ check_step_parts <- function(out, n, where, call,
 #'   correct.
 #' @noRd
 wrong_parts <- function(out, n, finite = FALSE) {
+  reward <- out$reward
   right <- c(
-    reward = is_reward(out$reward, n) &&
-      (!finite || is.numeric(out$reward) && all(is.finite(out$reward))),
+    reward = (is.numeric(reward) || is.logical(reward)) && length(reward) == n &&
+      !anyNA(reward) && (!finite || is.numeric(reward) && all(is.finite(reward))),
     terminated = is_flags(out$terminated, n),
     truncated = is_flags(out$truncated, n),
     info = is.null(out$info) || is.list(out$info)
@@ -175,8 +182,6 @@ wrong_parts <- function(out, n, finite = FALSE) {
   )
   must[!right]
 }
-
-is_reward <- function(x, n) (is.numeric(x) || is.logical(x)) && length(x) == n && !anyNA(x)
 
 is_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 

@@ -11,7 +11,10 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
   close_queued(client)
   fields <- c(
     seed = encode_seed(seed, instance$num_envs, call),
-    options = encode_options(options, call),
+    options = if (!is.null(options)) {
+      check_named_list(options, call = call)
+      to_json(options)
+    },
     reset_mask = mask_json(mask, instance, call)
   )
   if (instance$classic) {

@@ -79,13 +79,9 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
   # There are no more sub-environments than episodes. Without a number the server chooses the
   # workers.
   workers <- num_workers %||% if (max_envs < few_episodes) 0L
-  env <- if (!is.null(num_envs)) {
-    make_seeded(num_envs, workers)
-  } else {
-    first_supported(
-      function(n) make_seeded(n, if (!is.null(workers)) min(workers, n)),
-      counts_to_try(min(max_envs, full))
-    )
+  env <- if (!is.null(num_envs)) make_seeded(num_envs, workers)
+  for (n in if (is.null(num_envs)) counts_to_try(min(max_envs, full))) {
+    env <- env %||% if_supported(make_seeded(n, if (!is.null(workers)) min(workers, n)))
   }
   list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
 }
@@ -93,15 +89,6 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
 # The server may refuse this many; then try fewer.
 counts_to_try <- function(n) {
   unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))
-}
-
-first_supported <- function(make, counts) {
-  for (n in counts) {
-    env <- if_supported(make(n))
-    if (!is.null(env)) {
-      return(env)
-    }
-  }
 }
 
 check_no_workers <- function(num_workers, call) {

@@ -55,7 +55,10 @@ prepare_vector_step <- function(instance, fields, which, named, infos) {
 vector_step_reader <- function(instance, read_observation, n, named, infos) {
   space <- instance$single_observation_space
   function(answer) {
-    result <- answer$tensors %||% read_values(results_from_json(answer), "Its `reward`")
+    result <- answer$tensors %||% list(
+      reward = read_values(as.numeric(numbers_from_json(answer$reward)), "Its `reward`"),
+      terminated = unlist(answer$terminated), truncated = unlist(answer$truncated)
+    )
     check_answer_results(result, n)
     info <- read_info(answer, n)
     observation <- next_observation <- read_observation(answer)
@@ -71,14 +74,6 @@ vector_step_reader <- function(instance, read_observation, n, named, infos) {
       next_observation = next_observation
     )
   }
-}
-
-results_from_json <- function(answer) {
-  list(
-    reward = as.numeric(numbers_from_json(answer$reward)),
-    terminated = unlist(answer$terminated),
-    truncated = unlist(answer$truncated)
-  )
 }
 
 # The last observations of the sub-environments whose episode ended in the step: their numbers from
@@ -114,11 +109,10 @@ decode_sample <- function(instance, json) {
 # Checks --------------------------------------------------------------------------------
 
 check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
-  if (is.null(x)) {
-    return(invisible())
+  if (!is.null(x)) {
+    check_choice(x, choices, arg, call)
+    check_has_sub_envs(num_envs, x, arg, call)
   }
-  check_choice(x, choices, arg, call)
-  check_has_sub_envs(num_envs, x, arg, call)
 }
 
 check_num_workers <- function(num_workers, num_envs, call) {

@@ -35,15 +35,6 @@ env_watch <- function(x, instance_id) {
   open_watch(known_instance(x, instance_id))
 }
 
-# Creates an instance, and opens its page if the user wants to see it.
-create_and_watch <- function(client, env_id, seed, render_mode, ..., call = rlang::caller_env()) {
-  instance_id <- create_instance(client, env_id, seed, render_mode, ..., call = call)
-  if (identical(render_mode, "human")) {
-    watch_once(known_instance(client, instance_id, call), call)
-  }
-  instance_id
-}
-
 # Opens the page unless it was opened before.
 watch_once <- function(instance, call = rlang::caller_env()) {
   if (is.null(instance$shown)) {
@@ -82,12 +73,12 @@ watch_key <- function(instance, call) {
 #' @return Whether somebody watches, logical: opening a browser may fail without an error.
 #' @noRd
 await_watcher <- function(instance) {
-  deadline <- Sys.time() + watcher_timeout
+  deadline <- now() + watcher_timeout
   repeat {
     if (isTRUE(get_answer(instance$client, instance$route)$watched)) {
       return(TRUE)
     }
-    if (Sys.time() >= deadline) {
+    if (now() >= deadline) {
       return(FALSE)
     }
     Sys.sleep(0.1)

@@ -76,16 +76,10 @@ wrapped_server_env <- R6Class(
     env = NULL, traits = NULL, functions = NULL, info = NULL,
     # The actions as the wrapper's function gets them.
     take_action = function(action, which, call) {
-      traits <- private$traits
       check_which(which, private$instance, call)
       action <- numbered_actions(private$instance, narrow_values(action), call)
-      if (is.null(self$num_envs)) {
-        check_value(traits$action_rules, action, "", call, bounds = TRUE)
-        tidy_value(traits$action_space, action, NULL)
-      } else {
-        check_actions(traits, action, which %||% seq_len(self$num_envs), call)
-        tidy_actions(traits$action_space, action)
-      }
+      if (!is.null(self$num_envs)) which <- which %||% seq_len(self$num_envs)
+      checked_action(private$traits, action, which, call)
     },
     # The environment inside closes itself.
     finalize = function() NULL

@@ -93,7 +93,6 @@ gym_wrap <- function(env_id, wrapper, ...) {
     if (is_server_env(env_id)) {
       return(wrap_server_env(env_id, wrapper, kwargs, rlang::current_env()))
     }
-    check_wrappable(env_id, rlang::current_env())
     return(wrap_r_env(env_id, wrapper, kwargs, rlang::current_env()))
   }
   registered <- is_registered(env_id)
@@ -122,6 +121,11 @@ with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
   env_id$wrappers <- c(env_id$wrappers, wrappers)
   env_id
 }
+
+# Whether an environment is given by its id, with or without wrappers.
+is_given_by_id <- function(env) is.character(env) || inherits(env, "gym_wrapped")
+
+bare_id <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
 
 # The wrappers that gym_wrap() has recorded for an id.
 noted_wrappers <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$wrappers

@@ -191,7 +191,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
 }
 
 check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {
-  if (!is_flag(steps) && !identical(steps, "arrays")) {
+  if (!rlang::is_bool(steps) && !identical(steps, "arrays")) {
     abort_argument(steps, "TRUE, FALSE or \"arrays\"", "steps", call)
   }
   check_flag(next_observation, call = call)

@@ -24,9 +24,8 @@ environment_recipe <- function(env, vector_env, arguments) {
   own <- setdiff(names(arguments), c("num_envs", "num_workers", "frames"))
   recipe <- list(env = env, arguments = arguments[own], num_workers = arguments$num_workers)
   if (is_registered(env)) {
-    id <- if (is.character(env)) env else env$env_id
-    recipe$entry <- the_session$environments[id]
-  } else if (is.character(env) || inherits(env, "gym_wrapped")) {
+    recipe$entry <- the_session$environments[bare_id(env)]
+  } else if (is_given_by_id(env)) {
     session <- list(the_session$client, the_session$named_client)
     if (!any(vapply(session, identical, NA, vector_env$client))) {
       return("it was made by a client that is not the session's own")

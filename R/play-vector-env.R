@@ -80,7 +80,7 @@ warn_of_own_limit <- function(max_steps, vector_env, call) {
 
 # Only if it was decided here to play one episode after the other.
 inform_of_memory <- function(vector_env, env) {
-  if (length(vector_env$remembers) && (is.character(env) || inherits(env, "gym_wrapped"))) {
+  if (length(vector_env$remembers) && is_given_by_id(env)) {
     rlang::inform(
       c(i = paste0(paste(vector_env$remembers, collapse = " and "), " remembers earlier episodes, ",
                    "so they are played one after the other, in one batch.")),

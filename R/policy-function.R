@@ -30,11 +30,8 @@ ask_about_one <- function(policy, one, vector_env) {
           i = observations_hint(vector_env$observation_space),
           i = paste("There may be only one, as when all episodes but one have ended;",
                     "`drop = FALSE` keeps one row of a matrix a matrix.")),
-        # Keep the classes of the policy's own error, so that users can catch it by them.
-        class = c(setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition")),
-                  "gym_error_argument"),
-        argument = "policy", value = policy, call = vector_env$call,
-        parent = cnd
+        class = c(own_classes(cnd), "gym_error_argument"),
+        argument = "policy", value = policy, call = vector_env$call, parent = cnd
       )
     }
   )

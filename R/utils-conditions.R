@@ -59,3 +59,8 @@ describe_value <- function(value) {
   text <- paste(deparse(value, width.cutoff = 60L, nlines = 3L), collapse = " ")
   if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }
+
+# The classes of a user's error, which an error about it keeps, so that users can catch it by them.
+own_classes <- function(cnd) {
+  setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition"))
+}

@@ -51,3 +51,8 @@ nearest_name <- function(name, choices) {
   best <- order(distance(identity), distance(ordered))
   utils::head(choices[best[close[best]]], 1L)
 }
+
+did_you_mean <- function(name, choices, form = "`%s`") {
+  near <- if (length(choices)) nearest_name(name, choices)
+  if (length(near)) paste0("Did you mean ", sprintf(form, near), "?")
+}

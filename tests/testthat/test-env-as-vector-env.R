@@ -86,26 +86,37 @@ test_that("another class of environments is played by its own method", {
 })
 
 test_that("those that play are stepped with those before, until fewer than half of these play", {
-  env <- list(num_envs = 8L, single_action_space = space_discrete(100))
-  choose <- step_chooser(env)
-  asked <- choose(11:18, 1:8)
-  expect_identical(asked, list(action = 11:18, which = NULL, n = 8L, row = NULL))
+  asked <- NULL
+  # The observation of each is its action.
+  take <- function(action, which, infos, finals) {
+    asked <<- list(action = action, which = which)
+    n <- length(action)
+    list(observation = action, reward = numeric(n), terminated = logical(n),
+         truncated = logical(n), next_observation = action)
+  }
+  env <- structure(
+    list(num_envs = 8L, single_action_space = space_discrete(100),
+         single_observation_space = space_discrete(100), step = take),
+    class = "gym_server_env"
+  )
+  step <- bare_stepper(env)
+  step(11:18, 1:8)
+  expect_identical(asked, list(action = 11:18, which = NULL))
   playing <- c(1L, 2L, 4L, 6L, 8L)
-  asked <- choose(playing, playing)
+  expect_identical(step(playing, playing)$observation, playing)
   expect_null(asked$which)
-  expect_identical(asked$n, 8L)
-  expect_identical(asked$row, playing)
   expect_identical(asked$action[playing], playing)
   expect_length(asked$action, 8L)
-  asked <- choose(31:34, c(1L, 2L, 6L, 8L))
-  expect_identical(asked, list(action = 31:34, which = c(1L, 2L, 6L, 8L), n = 4L, row = NULL))
-  asked <- choose(41:43, c(2L, 6L, 8L))
+  step(31:34, c(1L, 2L, 6L, 8L))
+  expect_identical(asked, list(action = 31:34, which = c(1L, 2L, 6L, 8L)))
+  expect_identical(step(41:43, c(2L, 6L, 8L))$observation, 41:43)
   expect_identical(asked$which, c(1L, 2L, 6L, 8L))
-  expect_identical(asked$row, 2:4)
   expect_identical(asked$action[2:4], 41:43)
-  expect_identical(choose(5L, 8L), list(action = 5L, which = 8L, n = 1L, row = NULL))
+  step(5L, 8L)
+  expect_identical(asked, list(action = 5L, which = 8L))
   # One that was left out is back.
-  expect_identical(choose(6:7, c(3L, 8L))$which, c(3L, 8L))
+  step(6:7, c(3L, 8L))
+  expect_identical(asked$which, c(3L, 8L))
 })
 
 test_that("rows of a step are taken of all that it returned", {
