@@ -53,7 +53,7 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
   # Evaluate the token first: any later error would show the call with it.
   token <- as_token(token)
   check_string(remote_base)
-  if (!grepl("^https?://[^/]", remote_base)) {
+  if (!is_server_address(remote_base)) {
     gym_abort(
       c(
         paste0("`remote_base` must be the address of a server, not \"", remote_base, "\"."),
@@ -94,10 +94,7 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
 #' id <- post_request(client, "/v1/envs/", list(env_id = "CartPole-v1"))$instance_id
 #' post_request(client, paste0("/v1/envs/", id, "/close/"))
 post_request <- function(x, route, data = NULL) {
-  check_client(x)
-  check_route(route)
-  data <- as.list(data)
-  check_named_list(data)
+  data <- request_data(x, route, data)
   answer <- post_answer(x, route, json_texts(data))
   if (is.null(answer)) invisible() else answer
 }
@@ -105,10 +102,7 @@ post_request <- function(x, route, data = NULL) {
 #' @rdname post_request
 #' @export
 get_request <- function(x, route, data = NULL) {
-  check_client(x)
-  check_route(route)
-  data <- as.list(data)
-  check_named_list(data)
+  data <- request_data(x, route, data)
   for (name in names(data)) {
     value <- data[[name]]
     if (!is.atomic(value) || length(value) != 1L || is.na(value)) {
@@ -119,10 +113,15 @@ get_request <- function(x, route, data = NULL) {
   if (is.null(answer)) invisible() else answer
 }
 
-check_route <- function(route, call = rlang::caller_env()) {
+# Checks the arguments of a request to any route. Returns the data as a list.
+request_data <- function(x, route, data, call = rlang::caller_env()) {
+  check_client(x, call = call)
   if (!rlang::is_string(route) || !startsWith(route, "/")) {
     abort_argument(route, "a path that begins with a slash", "route", call)
   }
+  data <- as.list(data)
+  check_named_list(data, call = call)
+  data
 }
 
 query_text <- function(data) {

@@ -34,7 +34,7 @@ session_client <- function(install = TRUE, call = rlang::caller_env()) {
 
 # One client for all calls, so that they share a connection.
 named_client <- function(url, call = rlang::caller_env()) {
-  if (!grepl("^https?://[^/]", url)) {
+  if (!is_server_address(url)) {
     gym_abort(
       paste0("The variable GYM_SERVER_URL must be the address of a server, such as ",
              "\"http://127.0.0.1:5000\", not \"", url, "\"."),

@@ -27,8 +27,6 @@ read_values <- function(expr, what) {
   })
 }
 
-is_flag <- function(x) isTRUE(x) || isFALSE(x)
-
 is_object <- function(x) is.list(x) && (!length(x) || !is.null(names(x)))
 
 string_or_null <- function(x) if (rlang::is_string(x)) x
@@ -114,7 +112,7 @@ listed_texts <- function(listed, name, missing = NA_character_) {
 }
 
 listed_flags <- function(listed, name) {
-  listed_column(listed, name, NA, is_flag, "true or false")
+  listed_column(listed, name, NA, rlang::is_bool, "true or false")
 }
 
 # JSON writes a whole number without a point, as an integer.

@@ -42,8 +42,6 @@ repeat_request <- function(request, connection, handle, key, failure, call) {
   }
 }
 
-now <- function() proc.time()[["elapsed"]]
-
 # httr's timeout() takes precedence over the client's own.
 timeout_of <- function(client) {
   configured <- client_config(client)$options$timeout_ms

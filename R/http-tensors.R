@@ -76,14 +76,8 @@ place_by_row <- function(values, shape, labels = NULL) {
 
 # Each function takes bytes and returns numbers in the same order.
 
-read_double <- function(size) {
-  function(bytes, n) readBin(bytes, "double", n, size = size, endian = "little")
-}
-
-read_integer <- function(size, signed = TRUE) {
-  function(bytes, n) {
-    readBin(bytes, "integer", n, size = size, signed = signed, endian = "little")
-  }
+read_numbers <- function(what, size, signed = TRUE) {
+  function(bytes, n) readBin(bytes, what, n, size = size, signed = signed, endian = "little")
 }
 
 # Bytes stay bytes until they are reordered: they are a fourth of the size of integers.
@@ -110,12 +104,8 @@ read_half <- function(bytes, n) {
 
 read_bool <- function(bytes, n) as.logical(bytes)
 
-write_double <- function(size) {
-  function(x) writeBin(as.double(x), raw(), size = size, endian = "little")
-}
-
-write_integer <- function(size) {
-  function(x) writeBin(as.integer(x), raw(), size = size, endian = "little")
+write_numbers <- function(as_type, size) {
+  function(x) writeBin(as_type(x), raw(), size = size, endian = "little")
 }
 
 write_int32 <- function(x) {
@@ -132,15 +122,15 @@ tensor_type <- function(size, read, write) list(size = size, read = read, write 
 
 # By the name in a header: the bytes of a number, and the functions that read and write it.
 tensor_types <- list(
-  F64 = tensor_type(8L, read_double(8L), write_double(8L)),
-  F32 = tensor_type(4L, read_double(4L), write_double(4L)),
+  F64 = tensor_type(8L, read_numbers("double", 8L), write_numbers(as.double, 8L)),
+  F32 = tensor_type(4L, read_numbers("double", 4L), write_numbers(as.double, 4L)),
   F16 = tensor_type(2L, read_half, write_half),
-  I8 = tensor_type(1L, read_integer(1L), write_byte),
-  I16 = tensor_type(2L, read_integer(2L), write_integer(2L)),
+  I8 = tensor_type(1L, read_numbers("integer", 1L), write_byte),
+  I16 = tensor_type(2L, read_numbers("integer", 2L), write_numbers(as.integer, 2L)),
   I32 = tensor_type(4L, read_int32, write_int32),
   I64 = tensor_type(8L, read_int64(TRUE), write_int64),
   U8 = tensor_type(1L, read_byte, write_byte),
-  U16 = tensor_type(2L, read_integer(2L, signed = FALSE), write_integer(2L)),
+  U16 = tensor_type(2L, read_numbers("integer", 2L, FALSE), write_numbers(as.integer, 2L)),
   U32 = tensor_type(4L, read_uint32, write_int32),
   U64 = tensor_type(8L, read_int64(FALSE), write_int64),
   BOOL = tensor_type(1L, read_bool, write_byte)

@@ -121,8 +121,7 @@ install_uv <- function(call) {
 without_uv <- function() {
   paste(
     "Without uv, install the packages into a Python 3.10 to 3.13 by other means, in a terminal",
-    "for example by", paste0("`python -m pip install ",
-                             quote_for_terminal(system.file("server", package = "gym")), "`,"),
+    "for example by", paste0("`", pip_install_server("python"), "`,"),
     "and set GYM_PYTHON to that Python."
   )
 }

@@ -60,15 +60,11 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   if (ask && !confirm_install(plan)) {
     return(invisible())
   }
-  python <- with_interrupt_message(install_environment(plan, call))
-  inform_of_precedence(python)
-  invisible(python)
-}
-
-with_interrupt_message <- function(code) {
-  withCallingHandlers(code, interrupt = function(cnd) {
+  python <- withCallingHandlers(install_environment(plan, call), interrupt = function(cnd) {
     cli::cli_inform(c("!" = "Interrupted: {.code gym_server_install()} continues from here."))
   })
+  inform_of_precedence(python)
+  invisible(python)
 }
 
 # Whether an environment has the extras and its server can be imported.

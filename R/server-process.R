@@ -12,17 +12,12 @@ run_server <- paste0(
 launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
   log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
-  process <- with_own_tree_id(tryCatch(
-    processx::process$new(
-      python, c(arguments, "--own-log", log),
-      stdin = "|", stdout = "|", stderr = log,
-      env = server_environment(),
-      # processx or a forked child would kill the server. Instead the session closes the server's
-      # standard input; the server then closes its environments and ends.
-      cleanup = FALSE, windows_hide_window = TRUE
-    ),
-    error = function(cnd) NULL
-  ))
+  process <- start_python(
+    python, c(arguments, "--own-log", log), stdin = "|", stdout = "|", stderr = log,
+    # processx or a forked child would kill the server. Instead the session closes the server's
+    # standard input; the server then closes its environments and ends.
+    cleanup = FALSE
+  )
   if (is.null(process)) {
     return(not_started_reason(python))
   }
@@ -41,6 +36,16 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
     )
   }
   refusal_reason(lines)
+}
+
+# Starts a Python that can import the server; `NULL` if that fails.
+start_python <- function(python, arguments, ...) {
+  with_own_tree_id(tryCatch(
+    processx::process$new(
+      python, arguments, ..., env = server_environment(), windows_hide_window = TRUE
+    ),
+    error = function(cnd) NULL
+  ))
 }
 
 # Why a Python could not be started. A bare name is looked for on the PATH.
@@ -109,10 +114,10 @@ own_library_path <- function() {
 # Waits for the line by which the server reports that it accepts connections. Returns a list of its
 # address, `url`, and its own `token` from an earlier line; NULL if the process ended first.
 await_start <- function(process, log, timeout, call) {
-  deadline <- Sys.time() + timeout
+  deadline <- now() + timeout
   lines <- character()
   repeat {
-    left <- as.numeric(deadline - Sys.time(), units = "secs")
+    left <- deadline - now()
     if (left <= 0) {
       process$kill()
       abort_server_start(

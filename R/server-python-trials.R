@@ -11,7 +11,7 @@
 #' @noRd
 try_pythons <- function(pythons, timeout = 6) {
   trials <- lapply(pythons, begin_trial)
-  deadline <- Sys.time() + timeout
+  deadline <- now() + timeout
   outcomes <- Map(end_trial, pythons, trials, list(deadline))
   data.frame(
     python = pythons,
@@ -43,14 +43,10 @@ extras_in <- function(modules) {
 # Returns the running process and its output files, or NULL if it could not be started.
 begin_trial <- function(python) {
   output <- temporary_file("gym-python-", fileext = c(".out", ".err"))
-  process <- with_own_tree_id(tryCatch(
-    processx::process$new(
-      python, c("-c", paste0(print_version, run_server), "--version"),
-      stdout = output[[1L]], stderr = output[[2L]], env = server_environment(),
-      cleanup_tree = TRUE, windows_hide_window = TRUE
-    ),
-    error = function(cnd) NULL
-  ))
+  process <- start_python(
+    python, c("-c", paste0(print_version, run_server), "--version"),
+    stdout = output[[1L]], stderr = output[[2L]], cleanup_tree = TRUE
+  )
   if (!is.null(process)) list(process = process, output = output)
 }
 
@@ -63,7 +59,7 @@ end_trial <- function(python, trial, deadline) {
     return(outcome(reason = not_started_reason(python)))
   }
   on.exit(unlink(trial$output))
-  await_end(trial$process, as.numeric(deadline - Sys.time(), units = "secs"))
+  await_end(trial$process, deadline - now())
   lines <- lapply(trial$output, log_tail)
   version <- grep("^[0-9.]+$", lines[[1L]], value = TRUE)[1L]
   extras <- extras_in(strsplit(grep("^modules", lines[[1L]], value = TRUE)[1L], " ")[[1L]])

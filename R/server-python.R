@@ -44,14 +44,19 @@ named_python_message <- function(named, refusals, python) {
     paste0("The Python that ", by, " names cannot run the server."),
     x = paste0(named, ": ", refusals),
     i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
-      paste("What it lacks, in a terminal:", quote_for_terminal(named), "-m pip install",
-            quote_for_terminal(normalizePath(system.file("server", package = "gym"))))
+      paste("What it lacks, in a terminal:", pip_install_server(quote_for_terminal(named)))
     },
     i = paste0(
       "Without ", by, unset,
       " the session uses the one that `gym::gym_server_install()` installs."
     )
   )
+}
+
+# The command by which a Python installs the server.
+pip_install_server <- function(python) {
+  folder <- normalizePath(system.file("server", package = "gym"))
+  paste(python, "-m pip install", quote_for_terminal(folder))
 }
 
 quote_for_terminal <- function(path) shQuote(path, if (is_windows()) "cmd" else "sh")

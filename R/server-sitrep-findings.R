@@ -49,7 +49,7 @@ sitrep_suggested <- function(packages = suggested_packages) {
 # Secrets are left out, because people show the report to others.
 sitrep_variables <- function(variables) {
   texts <- if (length(variables)) {
-    values <- ifelse(names(variables) == token_variable, "<token>", without_password(variables))
+    values <- ifelse(names(variables) == token_variable, "<token>", without_passwords(variables))
     paste0(names(variables), "=", values, collapse = ", ")
   }
   finding("R", "variables", texts %||% "none of the package's is set")
@@ -86,17 +86,11 @@ folder_megabytes <- function(folder) {
 }
 
 sitrep_uv <- function() {
-  tryCatch(
-    sitrep_found_uv(find_uv(within = 3)),
-    gym_error = function(cnd) {
-      finding("Python", "uv", conditionMessage(cnd), "wrong", "Sys.unsetenv(\"GYM_UV\")")
-    }
-  )
-}
-
-sitrep_found_uv <- function(uv) {
+  uv <- tryCatch(find_uv(within = 3), gym_error = identity)
   candidates <- uv_candidates()
-  if (is.null(uv) && length(candidates)) {
+  if (inherits(uv, "gym_error")) {
+    finding("Python", "uv", conditionMessage(uv), "wrong", "Sys.unsetenv(\"GYM_UV\")")
+  } else if (is.null(uv) && length(candidates)) {
     finding("Python", "uv", paste(
       paste(candidates, collapse = ", "), "cannot be used (too old, or without an answer)"
     ), "note")
@@ -104,8 +98,6 @@ sitrep_found_uv <- function(uv) {
     finding("Python", "uv", uv %||% "not found, it would be downloaded if needed")
   }
 }
-
-without_password <- function(address) sub("//[^/@]*@", "//***@", address)
 
 sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown = 6L) {
   if (inherits(pythons, "error")) {
@@ -171,9 +163,9 @@ sitrep_named_server <- function(url) {
   if (!nzchar(url)) {
     return(NULL)
   }
-  what <- paste(without_password(url), "(GYM_SERVER_URL)")
+  what <- paste(without_passwords(url), "(GYM_SERVER_URL)")
   unset <- "Sys.unsetenv(\"GYM_SERVER_URL\")"
-  if (!grepl("^https?://[^/]", url)) {
+  if (!is_server_address(url)) {
     return(finding("servers", what, "is not the address of a server", "wrong", unset))
   }
   place <- local_place(sub("/+$", "", url))

@@ -81,7 +81,7 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
 
 check_own_token <- function(token, call = rlang::caller_env()) {
   hide_token(token)
-  if (!is_flag(token)) {
+  if (!rlang::is_bool(token)) {
     gym_abort(
       c(
         "`token` must be `TRUE` or `FALSE`.",
@@ -237,16 +237,12 @@ end_session <- function(session) {
     return()
   }
   session$ended <- TRUE
-  deadline <- proc.time()[["elapsed"]] + closing_time
+  deadline <- now() + closing_time
   servers <- if (Sys.getpid() == session$pid) {
     Filter(function(server) server$process$is_alive(), session$servers)
   }
   lapply(servers, close_server_input)
   close_session_instances(closing_time / 2)
-  stop_session_servers(servers, deadline)
-}
-
-stop_session_servers <- function(servers, deadline) {
   await_ends(servers, deadline - closing_time / 2)
   lapply(servers, terminate_server)
   await_ends(servers, deadline)
@@ -254,6 +250,6 @@ stop_session_servers <- function(servers, deadline) {
 
 await_ends <- function(servers, deadline) {
   for (server in servers) {
-    await_end(server$process, deadline - proc.time()[["elapsed"]])
+    await_end(server$process, deadline - now())
   }
 }

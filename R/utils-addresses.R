@@ -29,3 +29,5 @@ start_call <- function(place) {
 }
 
 base_of <- function(url) sub("(//[^/]*).*", "\\1", url)
+
+is_server_address <- function(url) grepl("^https?://[^/]", url)

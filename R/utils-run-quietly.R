@@ -33,9 +33,12 @@ load_processx <- function() {
 #' [load_processx()].
 #' @param seconds The longest time to wait.
 #' @noRd
+# In seconds.
+now <- function() proc.time()[["elapsed"]]
+
 await_end <- function(process, seconds) {
-  deadline <- proc.time()[["elapsed"]] + seconds
-  while (process$is_alive() && proc.time()[["elapsed"]] < deadline) {
+  deadline <- now() + seconds
+  while (process$is_alive() && now() < deadline) {
     Sys.sleep(0.01)
   }
 }
