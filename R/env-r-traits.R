@@ -58,7 +58,7 @@ checked_action <- function(traits, action, which, call) {
   rules <- traits$action_rules
   n <- if (!is.null(which)) length(which)
   if (!fits_quickly(rules, action, n, traits$fits_actions)) {
-    check_values(rules, action, n, call, which)
+    check_one_or_batch(rules, action, n, call, which)
   }
   if (is.null(n)) {
     tidy_value(traits$action_space, action, NULL)

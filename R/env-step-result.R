@@ -87,7 +87,7 @@ checked_observation <- function(traits, observation, n, where, call) {
   space <- traits$observation_space
   if (!fits_quickly(space, observation, n, traits$fits_observations)) {
     tryCatch(
-      check_values(space, observation, n, NULL),
+      check_one_or_batch(space, observation, n, NULL),
       gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
@@ -108,7 +108,7 @@ fits_quickly <- function(space, value, n, fits) {
 }
 
 # Checks a value, or with `n` a batch, whose sub-environments are `which`.
-check_values <- function(space, value, n, call, which = seq_len(n)) {
+check_one_or_batch <- function(space, value, n, call, which = seq_len(n)) {
   if (is.null(n)) {
     check_value(space, value, "", call, bounds = TRUE)
   } else {

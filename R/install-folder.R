@@ -101,9 +101,9 @@ use_python <- function(python) {
 
 # Servers of other sessions, also on other machines with the same home, may run from another
 # version's environment. A killed session may have left a copy or a download.
-remove_old_folders <- function(days = 30) {
+remove_old_folders <- function() {
   folders <- list.files(install_root(), "^([0-9a-f]{12}|bundle-|download-)", full.names = TRUE)
   others <- setdiff(folders, environment_folder())
-  old <- difftime(Sys.time(), last_used(others), units = "days") > days
+  old <- difftime(Sys.time(), last_used(others), units = "days") > 30
   unlink(others[old], recursive = TRUE, force = TRUE)
 }

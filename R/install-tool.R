@@ -71,13 +71,13 @@ abort_tool <- function(what, output, call, more = NULL) {
 }
 
 # The lines of an error message, or the last lines if there is none.
-error_lines <- function(output, n = 6L) {
+error_lines <- function(output) {
   lines <- trimws(output[nzchar(trimws(output))])
   begins <- grep("^error\\b", lines, ignore.case = TRUE)
   if (length(begins)) {
-    return(utils::head(lines[seq(begins[[1L]], length(lines))], n))
+    return(utils::head(lines[seq(begins[[1L]], length(lines))], 6L))
   }
-  utils::tail(lines, n)
+  utils::tail(lines, 6L)
 }
 
 # Advice on a failure, recognised by the messages of uv and the system. The first entry of

@@ -99,7 +99,7 @@ sitrep_uv <- function() {
   }
 }
 
-sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown = 6L) {
+sitrep_pythons <- function(pythons) {
   if (inherits(pythons, "error")) {
     stop(pythons)
   }
@@ -107,6 +107,8 @@ sitrep_pythons <- function(pythons, named = !is.null(named_python(NULL)), shown 
     return(finding("Python", "Pythons", "none was found", "note"))
   }
   taken <- which(pythons$runs)[1L]
+  named <- !is.null(named_python(NULL))
+  shown <- 6L
   own <- installed_server()$python
   rows <- Map(
     function(i, python, version, runs, reason, extras) {
