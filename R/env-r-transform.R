@@ -194,8 +194,8 @@ convert_functions <- function(inner, observation, action) {
   force(inner)
   list(
     reset = function(...) observation(inner$reset(...)),
-    step = function(taken, ...) {
-      out <- inner$step(action(taken), ...)
+    step = function(given, ...) {
+      out <- inner$step(action(given), ...)
       out$observation <- observation(out$observation)
       out
     }
