@@ -220,9 +220,9 @@ recalled <- function(memory, policy, at) {
 
 #' @export
 format.gym_agent_dqn <- function(x, ...) {
-  gradient_text(if (x$double) "Double DQN" else "DQN", x[c(
-    "memory_size", "batch", "updates_per_step", "learning_rate", "gamma", "epsilon"
-  )])
+  gradient_text(if (x$double) "Double DQN" else "DQN", c(memory = x$memory_size, x[c(
+    "batch", "updates_per_step", "learning_rate", "gamma", "epsilon"
+  )]))
 }
 
 #' @rdname agent_dqn

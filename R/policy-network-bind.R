@@ -116,7 +116,9 @@ check_output_fits <- function(policy, env, call) {
     gym_abort(
       c(paste0("The output \"", policy$output, "\" needs ", needs, ", but ",
                environment_label(env), " takes actions of ", format(space), "."),
-        i = if (!discrete) "`output = \"gaussian\"` draws numbers."),
+        i = if (!discrete) {
+          "`output = \"gaussian\"` draws numbers, and `agent_ppo()` trains such a network."
+        }),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
   }
