@@ -218,7 +218,4 @@ test_that("several parts with few values each have a map, of a table with its va
     a = c(6L, 6L, 7L, 7L), b = 1L, c = c(0L, 1L, 0L, 1L), action = c(1L, 1L, 0L, 0L)
   ))
   expect_output(print(map), "the action by a and b, for each c, 12 states", fixed = TRUE)
-  picture <- ggplot2::ggplot_build(ggplot2::autoplot(map))
-  expect_identical(nrow(ggplot2::layer_data(ggplot2::autoplot(map))), 12L)
-  expect_length(unique(picture$data[[1]]$PANEL), 2L)
 })
