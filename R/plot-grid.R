@@ -46,22 +46,16 @@ action_layers <- function(data, cells, above = 0) {
   named <- cells[!cells$does %in% c(names(arrow_steps), ""), ]
   inches <- min(0.08, 0.7 / max(data$columns, data$rows))
   head <- ggplot2::arrow(length = ggplot2::unit(inches, "in"))
-  each_ink(moves, function(moves, ink) {
+  list(
     ggplot2::geom_segment(
       ggplot2::aes(.data$x, .data$y, xend = .data$xend, yend = .data$yend), moves, arrow = head,
-      colour = ink, linewidth = 0.5
-    )
-  }, each_ink(named, function(named, ink) {
+      colour = moves$ink, linewidth = 0.5
+    ),
     ggplot2::geom_text(
-      ggplot2::aes(label = .data$does), named, nudge_y = above, colour = ink, fontface = "bold",
-      size = max(text_size(data, named$does), 2)
+      ggplot2::aes(label = .data$does), named, nudge_y = above, colour = named$ink,
+      fontface = "bold", size = max(text_size(data, named$does), 2)
     )
-  }))
-}
-
-# A layer for the cells with white ink and one for those with black, if there are any.
-each_ink <- function(cells, layer, others = NULL) {
-  c(unname(lapply(split(cells, cells$ink), function(part) layer(part, part$ink[[1L]]))), others)
+  )
 }
 
 number_texts <- function(values) {

@@ -159,11 +159,9 @@ value_layers <- function(data) {
     list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
     action_layers(data, cells, above = if (size > 0) 0.15 else 0),
     if (size > 0) {
-      each_ink(cells, function(cells, ink) {
-        ggplot2::geom_text(
-          ggplot2::aes(label = .data$text), cells, nudge_y = -below, size = size, colour = ink
-        )
-      })
+      ggplot2::geom_text(
+        ggplot2::aes(label = .data$text), cells, nudge_y = -below, size = size, colour = cells$ink
+      )
     }
   )
 }
@@ -200,14 +198,12 @@ q_layers <- function(data) {
       value_fill(), cell_tiles(data = unique(moves[c("row", "column")]), fill = NA)
     ),
     if (size > 0) {
-      each_ink(moves, function(moves, ink) {
-        ggplot2::geom_text(
-          ggplot2::aes(
-            .data$x, .data$y, label = .data$text, fontface = ifelse(.data$best, "bold", "plain")
-          ),
-          moves, size = size, colour = ink
-        )
-      })
+      ggplot2::geom_text(
+        ggplot2::aes(
+          .data$x, .data$y, label = .data$text, fontface = ifelse(.data$best, "bold", "plain")
+        ),
+        moves, size = size, colour = moves$ink
+      )
     }
   )
 }
