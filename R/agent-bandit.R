@@ -163,6 +163,12 @@ as.data.frame.gym_bandit_learning <- function(x, row.names = NULL, optional = FA
 
 # The column of the largest number in each row; of several one is drawn.
 any_best_column <- function(x) {
-  best <- x == row_max(x)
-  max.col(best * (1 + stats::runif(length(x))), "first")
+  column <- max.col(x, "first")
+  tied <- which(column != max.col(x, "last"))
+  if (length(tied)) {
+    rows <- x[tied, , drop = FALSE]
+    best <- rows == row_max(rows)
+    column[tied] <- max.col(best * (1 + stats::runif(length(rows))), "first")
+  }
+  column
 }

@@ -255,19 +255,19 @@ action_chooser <- function(agent, draw) {
   }
   changes <- is.function(epsilon)
   explores <- if (changes) 0 else epsilon
+  actions <- seq_len(value_columns_of(agent))
   function(values, taken) {
     if (changes) explores <<- scheduled(epsilon, taken, "epsilon")
     from <- if (explores > 0 && draw() < explores) {
-      which(values > -Inf)
+      actions[values > -Inf]
     } else {
-      best <- which.max(values)
-      if (!length(best) || anyNA(values)) abort_diverged()
-      equal <- which(values == values[[best]])
-      if (length(equal) == 1L) return(best)
-      equal
+      best <- max(values)
+      if (is.na(best)) abort_diverged()
+      actions[values == best]
     }
+    count <- length(from)
     # As draw_place() where all weigh the same, and twice as fast.
-    from[[as.integer(draw() * length(from)) + 1L]]
+    if (count == 1L) from else from[[as.integer(draw() * count) + 1L]]
   }
 }
 

@@ -39,12 +39,13 @@ dtype_bytes <- function(dtype) {
   if (is.na(bits)) 1 else bits / 8
 }
 
-# What is known about an environment, as long as the client lives.
+# What is known about an environment of one version of the server, as long as the client lives.
 known_of_env <- function(client, env_id, arguments) {
   check_client(client)
+  versions <- server_versions(client)
   state <- client_state(client)
   state$known_envs <- state$known_envs %||% new.env(parent = emptyenv())
-  key <- rlang::hash(list(env_id, if (length(arguments)) arguments))
+  key <- rlang::hash(list(env_id, if (length(arguments)) arguments, versions))
   state$known_envs[[key]] <- state$known_envs[[key]] %||% new.env(parent = emptyenv())
   state$known_envs[[key]]
 }

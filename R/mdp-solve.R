@@ -224,7 +224,7 @@ print.gym_solution <- function(x, ...) {
 
 solution_meaning <- function(x) {
   if (is.null(x$horizon)) {
-    "endless"
+    "infinite horizon"
   } else if (is.null(x$actions)) {
     paste("the policy, within", count_of(x$horizon, "step"))
   } else {

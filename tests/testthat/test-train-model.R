@@ -39,7 +39,7 @@ test_that("a model without a limit asks for one", {
   expect_false(from_model("CliffWalking-v1", model = FALSE))
 })
 
-test_that("the model is asked for once, and anew for other arguments or another limit", {
+test_that("the model is asked for once, and anew for other arguments, limits or versions", {
   client <- test_client()
   asked <- 0
   ask <- env_model
@@ -54,6 +54,13 @@ test_that("the model is asked for once, and anew for other arguments or another 
   short <- quiet(success_rate = 0.7, max_episode_steps = 3)
   expect_identical(asked, 2)
   expect_lte(max(short$history$mean_length), 3)
+  # Another server may have another table.
+  state <- client_state(client)
+  health <- state$health
+  withr::defer(state$health <- health)
+  state$health[[1L]]$versions$gymnasium <- "0.1"
+  quiet(success_rate = 0.7)
+  expect_identical(asked, 3)
 })
 
 # Plays a model at random in the learners' loop: the steps, and the returns of episodes.

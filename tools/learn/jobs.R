@@ -12,8 +12,8 @@ learn_jobs <- list(
     learn = function(seed) {
       learn_q(
         "FrozenLake-v1", total_steps = 3e5, learning_rate = schedule_exponential(0.5, 0.005, 2.5e5),
-        epsilon = schedule_linear(1, 0.1, 2e5), episodes = 64, num_envs = 16, num_workers = 0,
-        target = Inf, seed = seed, progress = FALSE
+        epsilon = schedule_linear(1, 0.1, 2e5), episodes = 64, target = Inf, seed = seed,
+        progress = FALSE
       )
     }
   ),
@@ -23,8 +23,8 @@ learn_jobs <- list(
       learn_q(
         "FrozenLake8x8-v1", total_steps = 2e6, discount = 0.999,
         learning_rate = schedule_exponential(0.5, 0.005, 1.6e6),
-        epsilon = schedule_linear(1, 0.1, 1.5e6), episodes = 256, num_envs = 64, num_workers = 0,
-        target = Inf, seed = seed, progress = FALSE
+        epsilon = schedule_linear(1, 0.1, 1.5e6), episodes = 256, target = Inf, seed = seed,
+        progress = FALSE
       )
     }
   ),
@@ -32,8 +32,8 @@ learn_jobs <- list(
     env_id = "CliffWalking-v1", goal = -13, seeds = 20, measure = "exact", judge = by_training,
     learn = function(seed) {
       learn_q(
-        "CliffWalking-v1", total_steps = 5e4, discount = 1, learning_rate = 0.5, num_envs = 8,
-        num_workers = 0, target = Inf, seed = seed, progress = FALSE
+        "CliffWalking-v1", total_steps = 5e4, max_steps = 1000, discount = 1, learning_rate = 0.5,
+        target = Inf, seed = seed, progress = FALSE
       )
     }
   ),
@@ -42,7 +42,7 @@ learn_jobs <- list(
     learn = function(seed) {
       learn_q(
         "Taxi-v4", iterations = 100, episodes = 200, discount = 1, learning_rate = 1,
-        num_envs = 32, num_workers = 0, target = Inf, seed = seed, progress = FALSE
+        target = Inf, seed = seed, progress = FALSE
       )
     }
   ),
