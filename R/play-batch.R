@@ -285,15 +285,13 @@ needed_episodes <- function(returns, each, target) {
 
 # Moments of observations ------------------------------------------------------------------
 
-# The number of steps to collect before their observations are added to the moments: R takes as long
-# to add a few rows as hundreds. It depends only on the size of an observation.
-steps_together <- function(numbers) max(1L, min(64L, 8192L %/% numbers))
-
-# Collects the observations before a step.
+# Collects the observations before a step. R takes as long to add a few rows to the moments as
+# hundreds, so several steps are added together. How many depends only on an observation's size.
 note_observations <- function(batch, playing) {
   values <- number_rows(playing$observation)
   batch$noted[[length(batch$noted) + 1L]] <- values
-  if (playing$taken %% steps_together(ncol(values)) == 0L) add_noted(batch)
+  together <- max(1L, min(64L, 8192L %/% ncol(values)))
+  if (playing$taken %% together == 0L) add_noted(batch)
 }
 
 add_noted <- function(batch) {

@@ -58,9 +58,11 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
     ))
   }
   for (batch in batches) {
-    played <- play_drawn_batch(
-      vector_env, batch, policy_of, report, ..., keep_steps = keep_steps, learner = learner,
-      max_steps = max_steps
+    # Its policy contains only its candidates.
+    policy <- policy_of(unique(batch$episodes$candidate))
+    played <- play_batch(
+      vector_env, policy, batch$episodes, batch$stream, each = batch$each, report = report, ...,
+      keep_steps = keep_steps, learner = learner, max_steps = max_steps
     )
     # After an interrupt the batch is added completely or not at all.
     suspendInterrupts(enter_batch(history, played))
@@ -121,17 +123,16 @@ batch_numbers <- function(size, candidate, episode) {
   }
 }
 
-# Its policy contains only its candidates.
-play_drawn_batch <- function(vector_env, batch, policy_of, report = function(ended) NULL, ...) {
-  play_batch(
-    vector_env, policy_of(unique(batch$episodes$candidate)), batch$episodes, batch$stream,
-    each = batch$each, report = report, ...
-  )
-}
-
 enter_batch <- function(history, played) {
   history$batches[[length(history$batches) + 1L]] <- played
   history$played_episodes <- history$played_episodes + length(played$episode)
+}
+
+# The returns and lengths of all episodes.
+episode_results <- function(history) {
+  lapply(c(returns = "return", lengths = "length"), function(name) {
+    unlist(lapply(history$batches, `[[`, name))
+  })
 }
 
 # Whether candidates can play the same episodes. They cannot if R steps sub-environments that share

@@ -76,8 +76,7 @@ same_episodes <- function(seed, episodes, max_steps) {
       vector_env, history, function(these) policy_subset(candidates, which[these]),
       max_steps = max_steps %||% Inf
     )
-    returns <- unlist(lapply(history$batches, function(batch) batch$return))
-    colMeans(matrix(returns, episodes))
+    colMeans(matrix(episode_results(history)$returns, episodes))
   }
   function(vector_env, candidates, count) {
     # If R steps sub-environments that share a seed, candidates played together would play different

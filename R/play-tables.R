@@ -25,33 +25,51 @@ episodes_table <- function(batches, several = FALSE) {
 #' @param next_observation Whether to include the observation after each step.
 #' @noRd
 steps_table <- function(batches, episodes, vector_env, several = FALSE, next_observation = FALSE) {
-  steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
-  column <- function(name) unlist(lapply(steps, function(step) step[[name]]))
-  values <- function(name, space) bind_batches(space, lapply(steps, function(step) step[[name]]))
+  steps <- steps_in_order(batches, episodes, vector_env, next_observation)
   observed <- vector_env$observation_space
-  named <- function(name) observation_columns(observed, values(name, observed))
-  acted <- vector_env$action_space
+  keys <- list(
+    candidate = if (several) episodes$candidate[steps$row], episode = episodes$episode[steps$row],
+    step = sequence(episodes$length)
+  )
   columns <- c(
-    named("observation"), value_columns(acted, values("action", acted), "action"),
-    list(
-      reward = as.numeric(column("reward")), terminated = column("terminated"),
-      truncated = column("truncated")
-    ),
+    keys[lengths(keys) > 0L], observation_columns(observed, steps$observation),
+    value_columns(vector_env$action_space, steps$action, "action"),
+    steps[c("reward", "terminated", "truncated")],
     if (next_observation) {
-      after <- named("next_observation")
+      after <- observation_columns(observed, steps$next_observation)
       stats::setNames(after, paste0("next_", names(after)))
     }
   )
-  # Stable sorting keeps the steps of an episode in order.
-  by_episode <- order(step_rows(batches), method = "radix")
-  columns <- lapply(columns, `[`, by_episode)
-  columns$truncated[cumsum(episodes$length)] <- episodes$truncated
-  of_step <- rep(seq_along(episodes$length), episodes$length)
-  keys <- list(
-    candidate = if (several) episodes$candidate[of_step], episode = episodes$episode[of_step],
-    step = sequence(episodes$length)
+  data.frame(columns, check.names = FALSE)
+}
+
+#' Put the steps of batches in order, episode after episode
+#' @inheritParams steps_table
+#' @return A list with an element, or a row, for each step: `row` (that of its episode in the
+#'   table), `observation`, `action`, `reward`, `terminated`, `truncated` and `next_observation`.
+#' @noRd
+steps_in_order <- function(batches, episodes, vector_env, next_observation = FALSE) {
+  steps <- unlist(lapply(batches, `[[`, "steps"), recursive = FALSE)
+  each <- function(name) lapply(steps, `[[`, name)
+  row <- step_rows(batches)
+  # Step by step, episodes were played in parallel. Stable sorting keeps the steps of each in order.
+  mixed <- is.unsorted(row)
+  order <- if (mixed) order(row, method = "radix") else seq_along(row)
+  bind <- function(name, space) {
+    values <- bind_batches(space, each(name))
+    if (mixed) batch_rows(space, values, order) else values
+  }
+  observed <- vector_env$observation_space
+  truncated <- unlist(each("truncated"))[order]
+  # An episode that `max_steps` cuts off is truncated in its last step.
+  truncated[cumsum(episodes$length)] <- episodes$truncated
+  list(
+    row = row[order], observation = bind("observation", observed),
+    action = bind("action", vector_env$action_space),
+    reward = as.numeric(unlist(each("reward")))[order],
+    terminated = unlist(each("terminated"))[order], truncated = truncated,
+    next_observation = if (next_observation) bind("next_observation", observed)
   )
-  data.frame(c(keys[lengths(keys) > 0L], columns), check.names = FALSE)
 }
 
 # The row of its episode in the table of episodes, for each step in the order of play.

@@ -151,7 +151,7 @@ play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
     "Interrupted after {finished} of {total} network{?s}; the rest of the landscape is empty.",
     finished, points
   )
-  returns <- unlist(lapply(history$batches, function(batch) batch$return))
+  returns <- episode_results(history)$returns
   whole <- seq_len(finished())
   plane$grid$mean_return <- NA_real_
   plane$grid$mean_return[whole] <- colMeans(

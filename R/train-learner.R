@@ -155,17 +155,13 @@ learns_beside <- function(state, vector_env, settings) {
 learn_beside <- function(learner, state, vector_env, settings) {
   policy <- with_generator(state$streams$agent, learner$whole$policy())
   history <- play_iteration(state, vector_env, settings, policy, keep_steps = TRUE)
-  batches <- history$batches
-  steps <- unlist(lapply(batches, `[[`, "steps"), recursive = FALSE)
-  each <- function(name) lapply(steps, `[[`, name)
-  reward <- unlist(each("reward"))
+  steps <- steps_in_order(history$batches, episodes_table(history$batches), vector_env)
+  reward <- steps$reward
   check_rewards(reward, NULL)
-  spaces <- state$agent$spaces
-  observation <- bind_batches(spaces$observation_space, each("observation"))
   # All at once: the division of episodes into requests must not change the last bit of a sum.
   learner$whole$learn(
-    state$agent$basis$of(observation, length(reward))[, 1L],
-    action_columns(spaces, unlist(each("action"))), reward, step_rows(batches)
+    state$agent$basis$of(steps$observation, length(reward))[, 1L],
+    action_columns(vector_env, steps$action), reward, steps$row
   )
   c(list(agent = learner$export()), episode_results(history))
 }

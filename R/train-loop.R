@@ -122,14 +122,8 @@ asked_candidates <- function(state, agent, call) {
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   asked <- plain_numbers(asked, "agent_ask()", call)
   check_asked(asked, policy, call)
-  list(candidates = policy_candidates(policy, asked), weights = asked)
-}
-
-# The returns and lengths of all episodes.
-episode_results <- function(history) {
-  lapply(c(returns = "return", lengths = "length"), function(name) {
-    unlist(lapply(history$batches, `[[`, name))
-  })
+  storage.mode(asked) <- "double"
+  list(candidates = new_candidates(policy, asked), weights = asked)
 }
 
 # A search plays as many rounds in parallel as a batch of episodes has room for.
@@ -212,41 +206,18 @@ abort_agent <- function(value, method, must, call) {
   )
 }
 
-# The steps of all candidates as rows, episode by episode.
+# The steps of all candidates, episode after episode.
 played_trajectories <- function(history, vector_env) {
-  batches <- history$batches
-  steps <- unlist(lapply(batches, function(batch) batch$steps), recursive = FALSE)
-  row <- step_rows(batches)
-  # In step-by-step play the episodes were played in parallel.
-  mixed <- is.unsorted(row)
-  order <- if (mixed) order(row, method = "radix") else seq_along(row)
-  row <- row[order]
-  each <- function(name) lapply(steps, function(step) step[[name]])
-  bind <- function(space, name) {
-    values <- bind_batches(space, each(name))
-    if (mixed) batch_rows(space, values, order) else values
-  }
-  episodes <- episodes_table(batches, several = TRUE)
-  truncated <- unlist(each("truncated"))[order]
-  # An episode that `max_steps` cuts off is truncated in its last step.
-  truncated[!duplicated(row, fromLast = TRUE)] <- episodes$truncated
-  list(
-    candidate = episodes$candidate[row], episode = episodes$episode[row],
-    observation = bind(vector_env$observation_space, "observation"),
-    action = bind(vector_env$action_space, "action"),
-    reward = as.numeric(unlist(each("reward")))[order],
-    terminated = unlist(each("terminated"))[order], truncated = truncated,
-    next_observation = bind(vector_env$observation_space, "next_observation")
-  )
+  episodes <- episodes_table(history$batches, several = TRUE)
+  steps <- steps_in_order(history$batches, episodes, vector_env, next_observation = TRUE)
+  row <- steps$row
+  c(list(candidate = episodes$candidate[row], episode = episodes$episode[row]), steps[-1L])
 }
 
 # The results of an agent's candidates. Those after the one that ended the search were not played.
 candidate_results <- function(history, asked, call) {
-  each <- function(name) {
-    values <- unlist(lapply(history$batches, function(batch) batch[[name]]))
-    colMeans(matrix(values, history$episodes))
-  }
-  returns <- each("return")
+  results <- lapply(episode_results(history), function(x) colMeans(matrix(x, history$episodes)))
+  returns <- results$returns
   if (!all(is.finite(returns))) {
     wrong <- which(!is.finite(returns))[[1L]]
     gym_abort(
@@ -260,7 +231,7 @@ candidate_results <- function(history, asked, call) {
     asked <- asked[seq_along(returns), , drop = FALSE]
   }
   list(
-    weights = asked, returns = returns, lengths = each("length"),
+    weights = asked, returns = returns, lengths = results$lengths,
     moments = Reduce(
       merge_moments,
       unlist(lapply(history$batches, function(batch) batch$moments), recursive = FALSE)

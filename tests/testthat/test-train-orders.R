@@ -6,7 +6,11 @@ shuffled_batches <- function(vector_env, history, policy_of, report = function(e
   counted$shuffled <- counted$shuffled + is.unsorted(order)
   played <- list()
   for (i in order) {
-    played[[i]] <- play_drawn_batch(vector_env, batches[[i]], policy_of, report, ...)
+    batch <- batches[[i]]
+    policy <- policy_of(unique(batch$episodes$candidate))
+    played[[i]] <- play_batch(
+      vector_env, policy, batch$episodes, batch$stream, each = batch$each, report = report, ...
+    )
   }
   for (one in played) enter_batch(history, one)
 }
