@@ -100,8 +100,7 @@ agent_ppo <- function(batch_steps = 2048, batch = 64, epochs = 10, learning_rate
   check_flag(normalize_advantages)
   check_flag(normalize_rewards)
   check_number(target_kl, min = 0, allow_null = TRUE)
-  log <- rlang::rep_named(ppo_log, NA_real_)
-  new_gradient_agent("ppo", c(settings, list(log = log)))
+  new_gradient_agent("ppo", settings, ppo_log)
 }
 
 ppo_log <- c(
@@ -218,12 +217,11 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   objective <- pmin.int(ratio * advantage, clipped * advantage)
   counts <- (advantage >= 0 & ratio <= 1 + settings$clip) |
     (advantage < 0 & ratio >= 1 - settings$clip)
-  slopes <- log_prob_slopes(
-    policy, both$draws, -(advantage * ratio * counts) / n, -settings$entropy / n
-  )
   error <- both$value - batch$return
   gradient <- c(
-    backward_network(both$of_policy, slopes$outputs), slopes$log_std,
+    draws_gradient(
+      policy, both$of_policy, -(advantage * ratio * counts) / n, -settings$entropy / n
+    ),
     backward_network(both$of_value, matrix(2 * settings$value_weight / n * error, 1L))
   )
   policy_loss <- -mean(objective)
@@ -237,15 +235,12 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
 }
 
 ppo_forward <- function(policy, value, weights, inputs, action) {
-  count <- count_weights(policy)
-  of_policy <- forward_network(policy, weights, inputs)
+  of_policy <- forward_draws(policy, weights, inputs, action)
   # Negative numbers, for all but the policy's, take four times as long.
-  of_value <- forward_network(value, weights[(count + 1L):length(weights)], inputs)
-  outputs <- of_policy$outputs
-  log_std <- if (is_gaussian(policy)) weights[(count - length(policy$log_std) + 1L):count]
+  of_value <- forward_network(value, weights[(count_weights(policy) + 1L):length(weights)], inputs)
   list(
-    draws = log_prob_of(policy, outputs, log_std, places_of_actions(nrow(outputs), action)),
-    value = of_value$outputs[1L, ], of_policy = of_policy, of_value = of_value
+    draws = of_policy$draws, value = of_value$outputs[1L, ], of_policy = of_policy,
+    of_value = of_value
   )
 }
 

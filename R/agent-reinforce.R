@@ -62,8 +62,7 @@ agent_reinforce <- function(batch_steps = 1000, learning_rate = 0.01, gamma = 0.
   check_count(value_updates)
   check_flag(normalize_advantages)
   check_number(max_grad_norm, min = 0)
-  log <- rlang::rep_named(reinforce_log, NA_real_)
-  new_gradient_agent("reinforce", c(settings, list(log = log)))
+  new_gradient_agent("reinforce", settings, reinforce_log)
 }
 
 reinforce_log <- c(
@@ -106,13 +105,9 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
   # A step up the gradient of mean(advantage * log-probability).
   policy <- agent$policy
   weights <- weight_vector(policy)
-  forward <- forward_network(policy, weights, rows$inputs)
-  draws <- log_prob_of(
-    policy, forward$outputs, policy$log_std,
-    places_of_actions(nrow(forward$outputs), rows$action)
-  )
-  slopes <- log_prob_slopes(policy, draws, -advantage / n, -now$entropy / n)
-  gradient <- c(backward_network(forward, slopes$outputs), slopes$log_std)
+  forward <- forward_draws(policy, weights, rows$inputs, rows$action)
+  draws <- forward$draws
+  gradient <- draws_gradient(policy, forward, -advantage / n, -now$entropy / n)
   moved <- adam_step(
     weights, clip_norm(gradient, agent$max_grad_norm), agent$adam, now$learning_rate
   )

@@ -48,9 +48,8 @@
 policy_log_prob <- function(policy, observation, action) {
   check_draws_known(policy)
   seen <- seen_columns(policy, observation)
-  chosen <- action_places(policy, action, ncol(seen))
-  outputs <- forward_network(policy, weight_vector(policy), seen)$outputs
-  log_prob_of(policy, outputs, policy$log_std, chosen)$log_prob
+  action <- counted_actions(policy, action, ncol(seen))
+  forward_draws(policy, weight_vector(policy), seen, action)$draws$log_prob
 }
 
 #' @rdname policy_log_prob
@@ -59,12 +58,10 @@ policy_log_prob_gradient <- function(policy, observation, action, weights = 1) {
   check_draws_known(policy)
   seen <- seen_columns(policy, observation)
   n <- ncol(seen)
-  chosen <- action_places(policy, action, n)
+  action <- counted_actions(policy, action, n)
   weights <- check_row_weights(weights, n, 1L)[, 1L]
-  forward <- forward_network(policy, weight_vector(policy), seen)
-  parts <- log_prob_of(policy, forward$outputs, policy$log_std, chosen)
-  slopes <- log_prob_slopes(policy, parts, weights)
-  c(backward_network(forward, slopes$outputs), slopes$log_std)
+  forward <- forward_draws(policy, weight_vector(policy), seen, action)
+  draws_gradient(policy, forward, weights)
 }
 
 #' @rdname policy_log_prob
@@ -82,54 +79,58 @@ policy_output_gradient <- function(policy, observation, weights = 1) {
 
 # The formulas --------------------------------------------------------------------------------
 
-#' Compute the log-probabilities of actions
-#' @param outputs A matrix with a column for each observation.
-#' @param log_std The logarithms of standard deviations.
-#' @param chosen As returned by action_places().
-#' @return A list: `log_prob` and `entropy`, vectors, and the parts of their derivatives.
+#' Compute a network's outputs and the log-probabilities of actions
+#' @param weights The policy's weights, which other weights may follow.
+#' @param action The actions, numbered from 1; for a Gaussian, a matrix with one in each column.
+#' @return As [forward_network()], with `draws`: a list of `log_prob` and `entropy`, vectors, and
+#'   the parts of their derivatives.
 #' @noRd
-log_prob_of <- function(policy, outputs, log_std, chosen) {
-  n <- ncol(outputs)
-  if (is_gaussian(policy)) {
+forward_draws <- function(policy, weights, inputs, action) {
+  forward <- forward_network(policy, weights, inputs)
+  outputs <- forward$outputs
+  k <- nrow(outputs)
+  forward$draws <- if (is_gaussian(policy)) {
+    count <- count_weights(policy)
+    log_std <- weights[(count - k + 1L):count]
     deviation <- exp(log_std)
-    z <- (chosen - outputs) / deviation
-    constant <- sum(log_std) + nrow(outputs) * log(2 * pi) / 2
-    return(list(
-      log_prob = -colSums(z * z) / 2 - constant, entropy = rep(constant + nrow(outputs) / 2, n),
+    z <- (action - outputs) / deviation
+    constant <- sum(log_std) + k * log(2 * pi) / 2
+    list(
+      log_prob = -colSums(z * z) / 2 - constant, entropy = rep(constant + k / 2, ncol(outputs)),
       z = z, deviation = deviation
-    ))
+    )
+  } else {
+    chosen <- places_of_actions(k, action)
+    logs <- outputs - rep(column_max(outputs), each = k)
+    logs <- logs - rep(log(colSums(exp(logs))), each = k)
+    p <- exp(logs)
+    list(
+      log_prob = logs[chosen], entropy = -colSums(p * logs), logs = logs, p = p, chosen = chosen
+    )
   }
-  largest <- column_max(outputs)
-  logs <- outputs - rep(largest, each = nrow(outputs))
-  logs <- logs - rep(log(colSums(exp(logs))), each = nrow(outputs))
-  p <- exp(logs)
-  list(
-    log_prob = logs[chosen], entropy = -colSums(p * logs), logs = logs, p = p, chosen = chosen
-  )
+  forward
 }
 
-#' Compute the derivatives of log-probabilities and entropies
+#' Differentiate log-probabilities and entropies with respect to a policy's weights
+#' @param forward As returned by [forward_draws()].
 #' @param weights,of_entropy The derivatives of the objective with respect to each log-probability,
 #'   and each entropy.
-#' @return A list: `outputs`, a matrix, and `log_std`, `NULL` for a softmax.
 #' @noRd
-log_prob_slopes <- function(policy, parts, weights, of_entropy = 0) {
+draws_gradient <- function(policy, forward, weights, of_entropy = 0) {
+  draws <- forward$draws
+  k <- nrow(forward$outputs)
   if (is_gaussian(policy)) {
-    k <- nrow(parts$z)
     by_output <- rep(weights, each = k)
-    return(list(
-      outputs = by_output * parts$z / parts$deviation,
-      log_std = rowSums(by_output * (parts$z * parts$z - 1)) +
-        sum(rep_len(of_entropy, ncol(parts$z)))
-    ))
+    of_log_std <- rowSums(by_output * (draws$z * draws$z - 1)) +
+      sum(rep_len(of_entropy, ncol(draws$z)))
+    return(c(backward_network(forward, by_output * draws$z / draws$deviation), of_log_std))
   }
-  k <- nrow(parts$p)
-  slopes <- parts$p * -rep(weights, each = k)
-  slopes[parts$chosen] <- slopes[parts$chosen] + weights
+  slopes <- draws$p * -rep(weights, each = k)
+  slopes[draws$chosen] <- slopes[draws$chosen] + weights
   if (any(of_entropy != 0)) {
-    slopes <- slopes - of_entropy * parts$p * (parts$logs + rep(parts$entropy, each = k))
+    slopes <- slopes - of_entropy * draws$p * (draws$logs + rep(draws$entropy, each = k))
   }
-  list(outputs = slopes)
+  backward_network(forward, slopes)
 }
 
 column_max <- function(x) {
@@ -147,11 +148,8 @@ seen_columns <- function(policy, observation, call = rlang::caller_env()) {
   network_columns(policy, rows$values, call)
 }
 
-#' Find the actions among the outputs
-#' @return For a softmax, the places of the actions' outputs in a matrix with a column for each
-#'   observation; for a Gaussian, a matrix with an action in each column.
-#' @noRd
-action_places <- function(policy, action, n, call = rlang::caller_env()) {
+# Checks actions, and returns them in the form for forward_draws().
+counted_actions <- function(policy, action, n, call = rlang::caller_env()) {
   action <- plain_numbers(action, "action", call)
   outputs <- policy$sizes[[length(policy$sizes)]]
   count <- if (is_gaussian(policy)) n * outputs else n
@@ -170,14 +168,11 @@ action_places <- function(policy, action, n, call = rlang::caller_env()) {
     must <- paste("whole numbers from", start, "to", start + outputs - 1L)
     abort_argument(action, must, "action", call)
   }
-  places_of_actions(outputs, as.integer(at))
+  as.integer(at)
 }
 
-# Converts actions from 1 to places in a matrix with so many outputs in each column. The numbers of
-# a Box stay as they are.
-places_of_actions <- function(outputs, action) {
-  if (is.matrix(action)) action else (seq_along(action) - 1L) * outputs + action
-}
+# Converts actions from 1 to places in a matrix with so many outputs in each column.
+places_of_actions <- function(outputs, action) (seq_along(action) - 1L) * outputs + action
 
 check_row_weights <- function(weights, n, outputs, call = rlang::caller_env()) {
   fits <- is.numeric(weights) && !anyNA(weights) && (
