@@ -108,8 +108,8 @@ learner_of.gym_agent_actor_critic <- function(agent) {
         act(after)
       }
     },
+    taken = function() taken,
     export = function(agent) {
-      agent$taken <- taken
       agent["preferences"] <- list(actor$get())
       agent
     },

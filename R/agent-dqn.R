@@ -79,9 +79,7 @@ agent_dqn <- function(memory = 50000, learning_starts = 1000, batch = 64, update
   check_number(max_grad_norm, min = 0)
   check_iteration(batch_steps, min_episodes)
   names(settings)[[1L]] <- "memory_size"
-  new_gradient_agent("dqn", c(settings, list(
-    carried = 0, log = rlang::rep_named(dqn_log, NA_real_)
-  )))
+  new_gradient_agent("dqn", c(settings, list(carried = 0)), dqn_log)
 }
 
 dqn_log <- c("loss", "n_updates", "exploration_rate", "learning_rate")

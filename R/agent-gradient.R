@@ -1,9 +1,12 @@
 # Shared by the agents that follow gradients: the number of episodes per iteration, the first
 # moments of observations, and the steps of an iteration as rows.
 
-new_gradient_agent <- function(class, settings) {
+new_gradient_agent <- function(class, settings, log) {
   structure(
-    c(settings, list(policy = NULL, iteration = 0L, steps = 0, episodes = settings$min_episodes)),
+    c(settings, list(
+      log = rlang::rep_named(log, NA_real_), policy = NULL, iteration = 0L, steps = 0,
+      episodes = settings$min_episodes
+    )),
     class = c(paste0("gym_agent_", class), "gym_agent_gradient", "gym_agent")
   )
 }

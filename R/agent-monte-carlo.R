@@ -125,8 +125,8 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
         choose(row(after), taken)
       }
     },
+    taken = function() taken,
     export = function(agent) {
-      agent$taken <- taken
       agent$visited <- returns$visited()
       agent
     },
@@ -195,8 +195,8 @@ off_policy_steps <- function(agent) {
         act(after, sub_env)
       }
     },
+    taken = function() taken,
     export = function(agent) {
-      agent$taken <- taken
       agent$visited <- weight_of
       agent
     }

@@ -135,8 +135,8 @@ learner_of.gym_agent_q <- function(agent) {
       if (!own_row || x == after) values <- row(after)
       choose(values, taken)
     },
+    taken = function() taken,
     export = function(agent) {
-      agent$taken <- taken
       if (!is.null(memory)) agent$memory <- memory$get()
       agent
     }
@@ -171,8 +171,8 @@ double_steps <- function(agent) {
       taken <<- taken + 1
       if (ended) NA_integer_ else choose(both(after), taken)
     },
+    taken = function() taken,
     export = function(agent) {
-      agent$taken <- taken
       agent$second <- second$get()
       agent
     },

@@ -76,10 +76,7 @@ learner_of.gym_agent_sarsa <- function(agent) {
       # The chosen action is taken if the episode goes on.
       following
     },
-    export = function(agent) {
-      agent$taken <- taken
-      agent
-    }
+    taken = function() taken
   )
 }
 

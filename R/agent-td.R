@@ -106,10 +106,7 @@ learner_of.gym_agent_td <- function(agent) {
       taken <<- taken + 1
       if (ended) NA_integer_ else act(after, sub_env, observation)
     },
-    export = function(agent) {
-      agent$taken <- taken
-      agent
-    },
+    taken = function() taken,
     act = if (is.null(probabilities)) {
       function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
     }

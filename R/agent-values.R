@@ -129,16 +129,18 @@ learning_of <- function(agent) {
 
 #' Make a learner from the functions of its steps
 #' @param learning As [learning_of()] makes it.
-#' @param begin,observe,export The learner's own, as [learner_of()] describes them; `export` returns
-#'   the agent without the shared elements.
+#' @param begin,observe The learner's own, as [learner_of()] describes them.
+#' @param taken A function that returns the number of steps so far.
+#' @param export A function that adds the learner's own elements to the agent.
 #' @param stores All its tables, in which masks are recorded.
 #' @noRd
-new_steps <- function(agent, learning, begin, observe, export,
+new_steps <- function(agent, learning, begin, observe, taken, export = identity,
                       stores = list(learning$store), act = NULL, whole = NULL) {
   list(
     begin = begin, observe = observe, act = act, whole = whole,
     export = function() {
       agent["weights"] <- list(learning$store$get())
+      agent$taken <- taken()
       export(agent)
     },
     forbid = function(x, forbidden) {

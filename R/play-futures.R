@@ -25,7 +25,10 @@ do_tasks <- function(next_task, deadline, call) {
     running = list(), again = list(), slowest = 0, next_task = next_task, ended = FALSE,
     broken = FALSE, deadline = deadline, call = call
   )
-  on.exit(the_session$left_futures <- c(the_session$left_futures, futures_of(crew)), add = TRUE)
+  on.exit(add = TRUE, {
+    left <- lapply(crew$running, `[[`, "future")
+    the_session$left_futures <- c(the_session$left_futures, left)
+  })
   repeat {
     launch_tasks(crew)
     if (!length(crew$running)) {
@@ -37,6 +40,37 @@ do_tasks <- function(next_task, deadline, call) {
       look_at(crew, number, number %in% ready)
     }
   }
+}
+
+#' Do numbered tasks on the workers, and enter their values in this order
+#' @param task A function of a number, which returns the data to send.
+#' @param enter A function of a task's value, called when all values before it were entered.
+#' @param here A function that does a task in this session.
+#' @param report A function of the values that came before their turn, called after each.
+#' @noRd
+do_in_order <- function(count, task, enter, deadline, call, here = run_task,
+                        report = function(waiting) NULL) {
+  sent <- entered <- 0L
+  values <- vector("list", count)
+  next_task <- function() {
+    if (sent == count) {
+      return(NULL)
+    }
+    sent <<- number <- sent + 1L
+    own <- task(number)
+    list(
+      task = own, here = function() here(own),
+      done = function(value) {
+        values[[number]] <<- value
+        while (entered < count && !is.null(values[[entered + 1L]])) {
+          entered <<- entered + 1L
+          enter(values[[entered]])
+        }
+        report(values[seq_len(count) > entered])
+      }
+    )
+  }
+  do_tasks(next_task, deadline, call)
 }
 
 # The longest time, in seconds, between two checks of the deadlines, and between two checks of a
@@ -86,17 +120,14 @@ worker_connection <- function(future) {
 
 is_open <- function(connection) tryCatch(isOpen(connection), error = function(cnd) FALSE)
 
-futures_of <- function(crew) lapply(crew$running, function(one) one$future)
-
 # Futures of an interrupted call keep their workers busy until somebody takes their values. Those
 # cancelled with their plan are not taken: future would start workers for them.
 collect_left_futures <- function() {
+  is_under_way <- function(future) {
+    identical(future$state, "running") &&
+      !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE))
+  }
   the_session$left_futures <- Filter(is_under_way, the_session$left_futures)
-}
-
-is_under_way <- function(future) {
-  identical(future$state, "running") &&
-    !isTRUE(tryCatch(future::resolved(future), error = function(cnd) FALSE))
 }
 
 # The next task: a lost one, or a new one.
@@ -213,7 +244,8 @@ task_failed <- function(crew, one, state) {
     error$host <- state$host
     stop(error)
   }
-  host <- state$host %||% future_host(one$future)
+  # The plan may not know it.
+  host <- state$host %||% worker_node(one$future)$host %||% "an unknown host"
   reason <- state$failed %||% first_message_line(state$error)
   last <- one$tries >= most_tries
   warn_of_workers(
@@ -227,9 +259,6 @@ task_failed <- function(crew, one, state) {
     crew$again <- c(crew$again, list(one))
   }
 }
-
-# The host of a future's worker, if the plan knows it.
-future_host <- function(future) worker_node(future)$host %||% "an unknown host"
 
 warn_of_workers <- function(text, hint = NULL) {
   rlang::warn(c(text, i = hint), class = "gym_warning_worker")

@@ -65,7 +65,8 @@ plan_kind <- function() {
   plan <- future::plan("next")
   local <- inherits(plan, c("multisession", "mirai_multisession"))
   alone <- local && future::nbrOfWorkers() == 1L
-  if (inherits(plan, "sequential") || alone || is_broken_plan()) {
+  broken <- !is.null(the_session$broken_plan) && identical(plan_workers(), the_session$broken_plan)
+  if (inherits(plan, "sequential") || alone || broken) {
     "none"
   } else if (inherits(plan, c("cluster", "multisession", "mirai_cluster", "mirai_multisession"))) {
     "kept"
@@ -84,10 +85,6 @@ plan_workers <- function() {
   }
   workers <- tryCatch(plan(NULL, lazy = TRUE)$workers, error = function(cnd) NULL)
   attr(workers, "name", exact = TRUE) %||% plan
-}
-
-is_broken_plan <- function() {
-  !is.null(the_session$broken_plan) && identical(plan_workers(), the_session$broken_plan)
 }
 
 inform_plays_here <- function(reason, hint = NULL) {
@@ -144,46 +141,25 @@ plays_on_workers <- function(vector_env, policy_of, learner) {
 #' @inheritParams play_batches
 #' @noRd
 play_in_futures <- function(vector_env, batches, history, policy_of, report, ...) {
-  sent <- entered <- 0L
-  played <- vector("list", length(batches))
-  enter <- function() {
-    while (entered < sent && !is.null(played[[entered + 1L]])) {
-      suspendInterrupts({
-        entered <<- entered + 1L
-        enter_batch(history, played[[entered]])
-      })
-    }
-  }
-  next_task <- function() {
-    if (sent == length(batches)) {
-      return(NULL)
-    }
-    sent <<- sent + 1L
-    number <- sent
-    task <- batch_task(vector_env, batches[[number]], policy_of, list(...))
-    list(
-      task = task,
-      here = function() rlang::exec(play_batch, vector_env, !!!task$part),
-      done = function(batch) {
-        played[[number]] <<- batch
-        enter()
-        report(sum(lengths(lapply(played[seq_len(sent)[-seq_len(entered)]], `[[`, "episode"))))
-      }
-    )
-  }
-  do_tasks(next_task, batch_deadline, vector_env$call)
-}
-
-# The policy of a batch contains only its candidates.
-batch_task <- function(vector_env, batch, policy_of, arguments) {
   recipe <- vector_env$recipe
   recipe$one_seed <- vector_env$one_seed
-  num_envs <- vector_env$num_envs
-  if (!vector_env$one_seed) num_envs <- min(num_envs, length(batch$episodes$episode))
-  policy <- policy_of(unique(batch$episodes$candidate))
-  new_worker_task(
-    "batch", recipe, server_versions(vector_env$client), num_envs = num_envs,
-    part = c(list(policy = policy), batch, arguments)
+  arguments <- list(...)
+  task <- function(number) {
+    batch <- batches[[number]]
+    num_envs <- vector_env$num_envs
+    if (!vector_env$one_seed) num_envs <- min(num_envs, length(batch$episodes$episode))
+    # It contains only the candidates of the batch.
+    policy <- policy_of(unique(batch$episodes$candidate))
+    new_worker_task(
+      "batch", recipe, server_versions(vector_env$client), num_envs = num_envs,
+      part = c(list(policy = policy), batch, arguments)
+    )
+  }
+  do_in_order(
+    length(batches), task, function(played) suspendInterrupts(enter_batch(history, played)),
+    batch_deadline, vector_env$call,
+    here = function(task) rlang::exec(play_batch, vector_env, !!!task$part),
+    report = function(waiting) report(sum(lengths(lapply(waiting, `[[`, "episode"))))
   )
 }
 

@@ -178,28 +178,11 @@ workers_of_plan <- function(plan) {
 # A future for each seed. Results are kept in the order of the seeds.
 train_in_futures <- function(vector_env, runs, keep, call) {
   recipe <- training_recipe(vector_env, runs[[1L]]$settings)
-  trained <- vector("list", length(runs))
-  begun <- kept <- 0L
-  next_seed <- function() {
-    if (begun == length(runs)) {
-      return(NULL)
-    }
-    begun <<- begun + 1L
-    at <- begun
-    run <- runs[[at]]
-    task <- new_worker_task("training", recipe, server_versions(vector_env$client), run = run)
-    list(
-      task = task, here = function() run_task(task),
-      done = function(training) {
-        trained[[at]] <<- training
-        while (kept < length(trained) && !is.null(trained[[kept + 1L]])) {
-          kept <<- kept + 1L
-          keep(trained[[kept]])
-        }
-      }
-    )
+  versions <- server_versions(vector_env$client)
+  task <- function(number) {
+    new_worker_task("training", recipe, versions, run = runs[[number]])
   }
-  do_tasks(next_seed, function(slowest) Inf, call)
+  do_in_order(length(runs), task, keep, function(slowest) Inf, call)
 }
 
 #' @exportS3Method
