@@ -74,14 +74,8 @@ preset_arguments <- function(preset) {
   if (!is.null(preset$epsilon_steps)) {
     preset$epsilon <- schedule_linear(1, preset$epsilon, preset$epsilon_steps)
   }
-  preset[intersect(names(formals(preset_maker(preset))), names(preset))]
-}
-
-preset_maker <- function(preset) get(paste0("agent_", preset$agent), mode = "function")
-
-preset_agent <- function(row) {
-  preset <- preset_settings(row)
-  rlang::exec(preset_maker(preset), !!!preset_arguments(preset))
+  make <- get(paste0("agent_", preset$agent), mode = "function")
+  preset[intersect(names(formals(make)), names(preset))]
 }
 
 # Two empty lists are equal, with names or without.

@@ -11,12 +11,10 @@
 #'   on there; `expected`, the expected reward of each row; `possible`, whether the action is valid.
 #' @noRd
 backup_of <- function(model, call) {
-  table <- model$transitions
+  table <- numbered_transitions(model)
   states <- length(model$start)
   actions <- as.integer(model$action_space$n)
-  row <- pair_rows(model, state_rows(model, table$state), table$action)
-  table <- table[order(row, method = "radix"), ]
-  row <- sort(row)
+  row <- table$pair
   place <- sequence(rle(row)$lengths)
   shape <- c(as.double(states) * actions, max(place))
   check_fits_memory(
@@ -37,7 +35,7 @@ backup_of <- function(model, call) {
   expected[abs(expected) <= 4 * .Machine$double.eps * rowSums(abs(rewards))] <- 0
   with_flow(list(
     states = states, actions = actions,
-    next_state = filled(state_rows(model, table$next_state), 1L),
+    next_state = filled(table$to, 1L),
     probability = probability, terminated = filled(table$terminated, TRUE),
     weight = filled(table$probability * !table$terminated),
     expected = expected, possible = seq_len(shape[[1L]]) %in% row
@@ -82,6 +80,16 @@ action_columns <- function(model, action) as.integer(action - model$action_space
 # The number of the pair of a state (given by its row) and an action.
 pair_rows <- function(model, row, action) {
   row + length(model$start) * (action_columns(model, action) - 1L)
+}
+
+# The transitions in the order of their pairs, with the columns `pair`, `from` and `to`, the numbers
+# of pairs and states.
+numbered_transitions <- function(model) {
+  table <- model$transitions
+  table$from <- state_rows(model, table$state)
+  table$to <- state_rows(model, table$next_state)
+  table$pair <- pair_rows(model, table$from, table$action)
+  table[order(table$pair, method = "radix"), ]
 }
 
 # The value of each action in each state, a matrix, given the value of each state (Bellman's

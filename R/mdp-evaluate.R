@@ -39,12 +39,15 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   if (!length(policies)) {
     abort_argument(policy, "a policy, or a list of at least one", "policy", call)
   }
+  # Each step counts 1 instead of its reward.
+  counting <- backup
+  counting$expected <- rep(1, length(backup$expected))
   rows <- lapply(seq_along(policies), function(i) {
     probabilities <- policy_matrix(policies[[i]], env, call)
     data.frame(
       candidate = i,
       mean_return = expected_return(env, backup, probabilities, limit, discount, call),
-      mean_length = expected_length(env, backup, probabilities, limit, call),
+      mean_length = expected_return(env, counting, probabilities, limit, 1, call),
       max_steps = as.double(limit)
     )
   })
@@ -55,12 +58,6 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
 
 expected_return <- function(model, backup, probabilities, limit, discount, call) {
   start_mean(model, limited_values(backup, probabilities, limit, discount, call))
-}
-
-expected_length <- function(model, backup, probabilities, limit, call) {
-  # Each step counts 1 instead of its reward.
-  backup$expected <- rep(1, length(backup$expected))
-  expected_return(model, backup, probabilities, limit, 1, call)
 }
 
 limited_values <- function(backup, probabilities, limit, discount, call) {

@@ -64,7 +64,11 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
   start <- plain_numbers(start)
   states <- spanned_space(c(table$state, table$next_state), "states")
   if (is_number(start)) {
-    start <- start_in(start, table, states)
+    if (!start %in% table$state) {
+      must <- "the number of a state that some row leaves"
+      abort_argument(start, must, "start", rlang::current_env())
+    }
+    start <- as.double(state_numbers(states) == start)
   }
   new_model(table, states, spanned_space(table$action, "actions"), start, spec)
 }
@@ -84,14 +88,6 @@ spanned_space <- function(numbers, what, call = rlang::caller_env()) {
     )
   }
   space_discrete(count, ends[[1L]])
-}
-
-# The probability that each state is the first one, if it is always this one.
-start_in <- function(start, table, states, call = rlang::caller_env()) {
-  if (!start %in% table$state) {
-    abort_argument(start, "the number of a state that some row leaves", "start", call)
-  }
-  as.double(state_numbers(states) == start)
 }
 
 #' Make a model from a table

@@ -82,16 +82,12 @@ state_without_end <- function(model) {
 
 # The moves of a model, and the states that are reached from its start.
 ways_of <- function(model) {
-  table <- model$transitions[model$transitions$probability > 0, ]
-  from <- state_rows(model, table$state)
-  to <- state_rows(model, table$next_state)
+  moves <- numbered_transitions(model)
+  moves <- moves[moves$probability > 0, ]
   leads <- function(reached) {
-    seq_along(reached) %in% to[reached[from] & !table$terminated]
+    seq_along(reached) %in% moves$to[reached[moves$from] & !moves$terminated]
   }
-  list(
-    from = from, to = to, terminated = table$terminated,
-    reached = closure(leads, model$start > 0)
-  )
+  c(moves[c("from", "to", "terminated")], list(reached = closure(leads, model$start > 0)))
 }
 
 #' Prepare the drawing of a model's transitions
@@ -101,22 +97,18 @@ ways_of <- function(model) {
 #' One search for a uniform number in that part then finds a transition.
 #' @noRd
 moves_of <- function(model) {
-  table <- model$transitions
+  table <- numbered_transitions(model)
   table <- table[table$probability > 0, ]
-  count <- length(model$start)
-  pair <- pair_rows(model, state_rows(model, table$state), table$action)
-  table <- table[order(pair, method = "radix"), ]
-  pair <- sort(pair)
   until <- cumsum(table$probability)
-  first <- match(seq_len(count * as.integer(model$action_space$n)), pair)
-  last <- first + tabulate(pair, length(first)) - 1L
+  pairs <- length(model$start) * as.integer(model$action_space$n)
+  first <- match(seq_len(pairs), table$pair)
+  last <- first + tabulate(table$pair, pairs) - 1L
   list(
     states = state_numbers(model$observation_space),
     start = cumsum(model$start), last_start = max(which(model$start > 0)),
     until = until, from = c(0, until)[first], width = until[last] - c(0, until)[first],
     first = first, last = last,
-    next_row = state_rows(model, table$next_state), reward = table$reward,
-    terminated = table$terminated
+    next_row = table$to, reward = table$reward, terminated = table$terminated
   )
 }
 

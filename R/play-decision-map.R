@@ -262,9 +262,17 @@ as.data.frame.gym_decision_map <- function(x, row.names = NULL, optional = FALSE
 #' @export
 print.gym_decision_map <- function(x, ...) {
   size <- sqrt(nrow(x$grid))
+  states <- count_of(nrow(x$grid), "state")
+  shows <- switch(
+    x$kind,
+    state = paste("the action in", states),
+    parts = paste0("the action by ", x$x, " and ", x$y, if (length(x$panels)) {
+      paste0(", for each ", paste(x$panels, collapse = " and "))
+    }, ", ", states),
+    paste0(x$x, " by ", x$y, ", ", size, " x ", size, " points")
+  )
   cat(
-    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": ", x$x, " by ",
-           x$y, ", ", size, " x ", size, " points"),
+    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": ", shows),
     paste0("Policy: ", policy_text(x$policy)),
     held_text(x$at),
     sep = "\n"

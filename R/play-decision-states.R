@@ -72,27 +72,3 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
     class = c("gym_parts_map", "gym_decision_map")
   )
 }
-
-#' @export
-print.gym_parts_map <- function(x, ...) {
-  cat(
-    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": the action by ",
-           x$x, " and ", x$y, if (length(x$panels)) {
-             paste0(", for each ", paste(x$panels, collapse = " and "))
-           }, ", ", count_of(nrow(x$grid), "state")),
-    paste0("Policy: ", policy_text(x$policy)),
-    sep = "\n"
-  )
-  invisible(x)
-}
-
-#' @export
-print.gym_state_map <- function(x, ...) {
-  cat(
-    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": the action in ",
-           count_of(nrow(x$grid), "state")),
-    paste0("Policy: ", policy_text(x$policy)),
-    sep = "\n"
-  )
-  invisible(x)
-}

@@ -44,9 +44,7 @@ evaluate_policy.default <- function(env, policy, episodes = 100, seed = NULL, ..
                                     max_steps = NULL, num_envs = NULL, level = 0.95,
                                     progress = rlang::is_interactive(), client = gym_client(),
                                     num_workers = NULL) {
-  if (!is_number(level) || level <= 0 || level >= 1) {
-    abort_argument(level, "a number between 0 and 1", "level", rlang::current_env())
-  }
+  check_level(level)
   played <- naming_own_call(rollout(
     env, policy, episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,
     progress = progress, client = client, num_workers = num_workers
@@ -94,18 +92,22 @@ print.gym_evaluation <- function(x, ...) {
     sep = "\n"
   )
   if (nrow(x) == 1L && is.null(count_candidates(attr(x, "policy")))) {
-    mean <- paste0(number_text(x$mean_return), se_text(x$se), interval_text(x))
-    cat("Mean return: ", mean, "\n", sep = "")
+    # A single episode has no interval.
+    interval <- if (!is.na(x$se)) paste0(", ", interval_text(x$lower, x$upper, attr(x, "level")))
+    cat("Mean return: ", number_text(x$mean_return), se_text(x$se), interval, "\n", sep = "")
   } else {
     print_candidates(x, attr(x, "level"))
   }
   invisible(x)
 }
 
-interval_text <- function(x) {
-  if (!is.na(x$se)) {
-    paste0(", ", level_text(attr(x, "level")), " interval from ", number_text(x$lower), " to ",
-           number_text(x$upper))
+interval_text <- function(lower, upper, level = 0.95, text = number_text) {
+  paste0(level_text(level), " interval from ", text(lower), " to ", text(upper))
+}
+
+check_level <- function(level, call = rlang::caller_env()) {
+  if (!is_number(level) || level <= 0 || level >= 1) {
+    abort_argument(level, "a number between 0 and 1", "level", call)
   }
 }
 

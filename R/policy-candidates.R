@@ -147,8 +147,7 @@ policy_rows.gym_policy_candidates <- function(policy, candidate, sub_env) {
 #' @exportS3Method
 act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
   network <- policy$network
-  signal <- network_inputs(network$observation_space, number_rows(observation))
-  signal <- normalized(signal, network$moments)
+  signal <- network_inputs(network, number_rows(observation))
   for (layer in seq_along(policy$layers)) {
     signal <- with_bias(signal, network)
     signal <- activate(sum_weighted(signal, policy$layers[[layer]]), network$activation[[layer]])

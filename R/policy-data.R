@@ -10,24 +10,20 @@
 #'   user's class.
 #' @noRd
 policy_data <- function(policy, env) {
-  # A subclass may have its own method to act.
-  if (class(policy)[[1L]] %in% data_classes) data_of_policy(policy, env)
-}
-
-data_classes <- paste0("gym_policy_", c("network", "candidates", "random", "table", "list"))
-
-data_of_policy <- function(policy, env) UseMethod("data_of_policy")
-
-#' @exportS3Method
-data_of_policy.gym_policy_network <- function(policy, env) {
-  network_data(policy, rbind(weight_vector(policy)))
-}
-
-#' @exportS3Method
-data_of_policy.gym_policy_candidates <- function(policy, env) {
-  if (class(policy$policy)[[1L]] == "gym_policy_network") {
-    network_data(policy$policy, policy$weights)
-  }
+  # By the first class alone: a subclass may have its own method to act.
+  switch(
+    class(policy)[[1L]],
+    gym_policy_network = network_data(policy, rbind(weight_vector(policy))),
+    gym_policy_candidates = if (class(policy$policy)[[1L]] == "gym_policy_network") {
+      network_data(policy$policy, policy$weights)
+    },
+    gym_policy_random = random_data(policy, env),
+    gym_policy_table = list(
+      document = list(kind = "table", epsilon = policy$epsilon, temperature = policy$temperature),
+      tensors = list(q = policy$q)
+    ),
+    gym_policy_list = list_data(policy, env)
+  )
 }
 
 # `weights` has a row for each candidate.
@@ -51,34 +47,18 @@ network_data <- function(policy, weights) {
   )
 }
 
-#' @exportS3Method
-data_of_policy.gym_policy_random <- function(policy, env) {
-  if (!is.null(policy$possible)) {
-    return(NULL)
-  }
+random_data <- function(policy, env) {
   own <- policy$action_space
-  document <- list(kind = "random")
-  if (!identical(own, env$action_space)) {
-    if (!inherits(own, "gym_space_discrete")) {
-      return(NULL)
-    }
-    document$action_space <- own[c("n", "start")]
+  narrower <- !identical(own, env$action_space)
+  if (is.null(policy$possible) && (!narrower || inherits(own, "gym_space_discrete"))) {
+    document <- c(
+      list(kind = "random"), if (narrower) list(action_space = own[c("n", "start")])
+    )
+    list(document = document, tensors = list())
   }
-  list(document = document, tensors = list())
 }
 
-#' @exportS3Method
-data_of_policy.gym_policy_table <- function(policy, env) {
-  list(
-    document = list(
-      kind = "table", epsilon = policy$epsilon, temperature = policy$temperature
-    ),
-    tensors = list(q = policy$q)
-  )
-}
-
-#' @exportS3Method
-data_of_policy.gym_policy_list <- function(policy, env) {
+list_data <- function(policy, env) {
   each <- lapply(unname(unclass(policy)), policy_data, env = env)
   if (any(vapply(each, is.null, NA))) {
     return(NULL)

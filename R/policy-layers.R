@@ -88,9 +88,5 @@ backward_network <- function(forward, slopes) {
 #' @param values A matrix with an observation in each row.
 #' @noRd
 network_columns <- function(policy, values, call = rlang::caller_env()) {
-  inputs <- network_inputs(policy$observation_space, values, call)
-  if (ncol(inputs) != policy$sizes[[1L]] || !is.numeric(inputs)) {
-    abort_observation(policy, values, call)
-  }
-  t(normalized(inputs, policy$moments))
+  t(network_inputs(policy, values, call))
 }

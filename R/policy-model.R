@@ -27,7 +27,7 @@
 #'
 #' @param x A fitted model with a method for [predict()], for instance of [lm()], [glm()],
 #'   `rpart::rpart()` or `nnet::nnet()`. Policies and functions of observations are returned
-#'   unchanged. A search or a rollout returns its policy.
+#'   unchanged. A training, a search or a rollout returns its policy.
 #' @param ... Further arguments of the model's `predict()`.
 #' @param type The `type` for `predict()`, a string. The default for a [glm()] is `"response"`; for
 #'   `rpart::rpart()` `"class"` for a classification, otherwise `"vector"`; for `nnet::nnet()`
@@ -77,13 +77,13 @@ as_policy.function <- function(x, ...) {
 }
 
 #' @export
-as_policy.gym_search <- function(x, ...) {
+as_policy.gym_training <- function(x, ...) {
   check_dots_empty(...)
   x$policy
 }
 
 #' @export
-as_policy.gym_rollout <- as_policy.gym_search
+as_policy.gym_rollout <- as_policy.gym_training
 
 #' @rdname as_policy
 #' @export

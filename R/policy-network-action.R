@@ -71,10 +71,8 @@ box_action <- function(space, outputs, policy, one) {
 
 is_gaussian <- function(policy) identical(policy$output, "gaussian")
 
-# Whether each action has a log-probability. An output chosen by the environment will have one.
+# Whether each action has a log-probability.
 has_log_prob <- function(policy) policy$output %in% c("softmax", "gaussian")
-
-draws_by_probability <- function(policy) is.na(policy$output) || has_log_prob(policy)
 
 # The policy that takes the most likely action, or the one with the largest value.
 greedy_policy <- function(policy) {

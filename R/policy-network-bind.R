@@ -43,7 +43,7 @@ with_sizes_of <- function(policy, env) {
   }
   policy <- with_deviations(policy)
   policy$weights <- if (is.null(policy$weights_seed)) {
-    zero_weights(policy$sizes, policy$bias)
+    lapply(weight_shapes(policy$sizes, policy$bias), array, data = 0)
   } else {
     with_generator(new_generator(policy$weights_seed), draw_first_weights(policy))
   }

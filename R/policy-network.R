@@ -261,11 +261,7 @@ act_batch.gym_policy_by_column <- function(policy, observation, n, vector_env) {
 #' @return A matrix with one row for each observation, one column for each output.
 #' @noRd
 network_outputs <- function(policy, values, call = rlang::caller_env()) {
-  signal <- network_inputs(policy$observation_space, values, call)
-  if (ncol(signal) != policy$sizes[[1L]] || !is.numeric(signal)) {
-    abort_observation(policy, values, call)
-  }
-  signal <- normalized(signal, policy$moments)
+  signal <- network_inputs(policy, values, call)
   for (layer in seq_along(policy$weights)) {
     signal <- with_bias(signal, policy)
     signal <- activate(tcrossprod(signal, policy$weights[[layer]]), policy$activation[[layer]])
@@ -289,10 +285,14 @@ abort_observation <- function(policy, values, call) {
   )
 }
 
-network_inputs <- function(space, values, call = rlang::caller_env()) {
+network_inputs <- function(policy, values, call = rlang::caller_env()) {
   values <- plain_numbers(values, "observation", call)
+  space <- policy$observation_space
   if (!inherits(space, "gym_space_discrete")) {
-    return(values)
+    if (ncol(values) != policy$sizes[[1L]] || !is.numeric(values)) {
+      abort_observation(policy, values, call)
+    }
+    return(normalized(values, policy$moments))
   }
   at <- if (is.numeric(values)) values[, 1L] - space$start + 1 else NA
   if (anyNA(at) || any(at < 1 | at > space$n | at != trunc(at))) {
@@ -306,8 +306,8 @@ network_inputs <- function(space, values, call = rlang::caller_env()) {
 
 # Drawing again, and printing ------------------------------------------------------
 
-#' @exportS3Method
-policy_resample.gym_policy_network <- function(policy, call = rlang::caller_env()) {
+# Draws its weights again.
+policy_resample <- function(policy) {
   if (anyNA(policy$sizes)) {
     # The weights depend on this number and are drawn when the sizes are known.
     policy$weights_seed <- draw_seed()

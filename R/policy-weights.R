@@ -33,12 +33,10 @@ draw_orthogonal <- function(shape, gain, bias) {
 
 # If actions are drawn, all of them are nearly equally likely at first.
 draw_first_weights <- function(policy) {
-  last_gain <- if (draws_by_probability(policy)) 0.01 else 1
+  # An output that the environment chooses will draw.
+  draws <- is.na(policy$output) || has_log_prob(policy)
+  last_gain <- if (draws) 0.01 else 1
   draw_weights(policy$sizes, policy$bias, policy$init, last_gain)
-}
-
-zero_weights <- function(sizes, bias) {
-  lapply(weight_shapes(sizes, bias), function(shape) matrix(0, shape[[1L]], shape[[2L]]))
 }
 
 # The user may have changed the weights. A network whose sizes depend on the environment has no

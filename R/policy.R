@@ -228,25 +228,6 @@ policy_bind <- function(policy, env, call = rlang::caller_env()) UseMethod("poli
 #' @exportS3Method
 policy_bind.default <- function(policy, env, call = rlang::caller_env()) policy
 
-#' Draw another policy of the same kind
-#' @noRd
-policy_resample <- function(policy, call = rlang::caller_env()) UseMethod("policy_resample")
-
-#' @exportS3Method
-policy_resample.default <- function(policy, call = rlang::caller_env()) {
-  gym_abort(
-    c(
-      paste0("A random search needs a policy with weights to draw, not ",
-             policy_text(policy), "."),
-      i = "`policy_network()` makes one."
-    ),
-    class = "gym_error_argument",
-    argument = "policy",
-    value = policy,
-    call = call
-  )
-}
-
 #' Choose an action for each of many observations
 #'
 #' @param policy A policy that is bound to the environment.

@@ -119,7 +119,8 @@ training_arguments <- function(settings) {
   c(
     list(
       env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
-      agent = comparable_agent(settings$agent),
+      # The source of its settings makes no difference.
+      agent = replace(settings$agent, "preset", NULL),
       policy = comparable_policy(settings$policy, settings$agent)
     ),
     if (settings$search) list(rounds = settings$iterations),
@@ -142,12 +143,6 @@ environment_traits <- function(env) {
       autoreset_mode = env$autoreset_mode
     )
   }
-}
-
-# The source of its settings makes no difference.
-comparable_agent <- function(agent) {
-  agent$preset <- NULL
-  agent
 }
 
 # The training's seed determines weights that are not drawn yet. An agent that draws all weights

@@ -89,9 +89,7 @@ compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, 
   check_reference(reference, call)
   check_count(reps)
   check_seed(seed)
-  if (!is_number(level) || level <= 0 || level >= 1) {
-    abort_argument(level, "a number between 0 and 1", "level", call)
-  }
+  check_level(level)
   given <- name_results(list(...), as.list(substitute(list(...)))[-1L])
   curves <- if (length(given) == 1L && is.data.frame(given[[1L]])) given[[1L]]
   trainings <- if (is.null(curves)) {

@@ -129,7 +129,8 @@ write_config <- function(file, settings) {
   config <- c(
     list(
       agent = format(settings$agent), env = settings$env_id,
-      kwargs = empty_as_object(settings$kwargs),
+      # In JSON an empty list without names would be an array.
+      kwargs = if (length(settings$kwargs)) settings$kwargs else rlang::set_names(list()),
       policy = if (is.null(settings$policy)) "the learner's own" else policy_text(settings$policy)
     ),
     settings[numbers],
@@ -143,22 +144,17 @@ write_config <- function(file, settings) {
 
 as_lines <- function(lines) charToRaw(paste0(enc2utf8(lines), "\n", collapse = ""))
 
-# In JSON an empty list would be an array.
-empty_as_object <- function(values) if (length(values)) values else rlang::set_names(list())
-
 plain_provenance <- function(from) {
   from <- unclass(from)
   from$started <- format(from$started, "%Y-%m-%dT%H:%M:%S%z")
   from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
 }
 
-keep_as_earlier <- function(file) if (file.exists(file)) file.rename(file, free_name(file))
-
-# "progress-1.csv" for "progress.csv", or the first such name that is free.
-free_name <- function(file) {
+# Renames "progress.csv" to "progress-1.csv", or to the first such name that is free.
+keep_as_earlier <- function(file) {
   number <- 1L
   while (file.exists(name <- sub("[.]csv$", paste0("-", number, ".csv"), file))) {
     number <- number + 1L
   }
-  name
+  if (file.exists(file)) file.rename(file, name)
 }

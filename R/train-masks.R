@@ -18,43 +18,21 @@ with_masks <- function(vector_env, name, note, call) {
       class = "gym_error_argument", argument = "mask", value = name, call = call
     )
   }
-  masked <- if (is.null(env$num_envs)) masked_single_env else masked_sub_envs
-  vector_env[c("reset", "step")] <- masked(env, vector_env, name, note, call)
+  vector_env[c("reset", "step")] <- masked_functions(env, vector_env, name, note, call)
   # If the environment starts the next episode itself, its info would replace that of the last step.
   vector_env$begins_next <- FALSE
   vector_env$step_one <- NULL
   vector_env
 }
 
-masked_single_env <- function(env, vector_env, name, note, call) {
-  batch <- function(value) batch_of(vector_env$observation_space, list(value))
-  actions <- vector_env$action_space
-  list(
-    reset = function(seeds, which = 1L) {
-      out <- env$reset(seed = seeds, return_info = TRUE)
-      observation <- batch(out$observation)
-      mask <- mask_in(out$info, name, 1L, actions, call)
-      if (!is.null(mask)) note(observation, mask)
-      observation
-    },
-    step = function(action, which = 1L) {
-      out <- env$step(batch_value(actions, action, 1L))
-      out$observation <- batch(out$observation)
-      out$next_observation <- out$observation
-      mask <- needed_mask(out$info, name, 1L, actions, call)
-      if (!out$terminated) note(out$observation, mask)
-      out
-    }
-  )
-}
-
-masked_sub_envs <- function(env, vector_env, name, note, call) {
-  n <- env$num_envs
+masked_functions <- function(env, vector_env, name, note, call) {
   space <- vector_env$observation_space
   actions <- vector_env$action_space
+  if (is.null(env$num_envs)) env <- one_as_batch(env, space, actions)
+  n <- env$num_envs
   was_reset <- FALSE
   list(
-    reset = function(seeds, which) {
+    reset = function(seeds, which = 1L) {
       some <- was_reset && length(which) < n
       seed <- rep(if (some) NA_real_ else seeds, length.out = n)
       seed[which] <- seeds
@@ -66,7 +44,7 @@ masked_sub_envs <- function(env, vector_env, name, note, call) {
       if (!is.null(mask)) note(observation, mask[which, , drop = FALSE])
       observation
     },
-    step = function(action, which) {
+    step = function(action, which = 1L) {
       count <- length(which)
       out <- if (count < n) env$step(action, which = which) else env$step(action)
       out$next_observation <- out$next_observation %||% out$observation
@@ -80,6 +58,19 @@ masked_sub_envs <- function(env, vector_env, name, note, call) {
       }
       out
     }
+  )
+}
+
+# A single environment, with batches of one observation and one action.
+one_as_batch <- function(env, space, actions) {
+  force(env)
+  batched <- function(out) {
+    out$observation <- batch_of(space, list(out$observation))
+    out
+  }
+  list(
+    num_envs = 1L, reset = function(...) batched(env$reset(...)),
+    step = function(action) batched(env$step(batch_value(actions, action, 1L)))
   )
 }
 

@@ -99,7 +99,9 @@ append_memory <- function(memory, file, first, last) {
   numbers <- seq.int(first, last)
   # Cut off what an earlier attempt on a full disk has left.
   before <- 8 * nrow(memory$steps) * ((first - 1) %% memory$size)
-  if (file.exists(file) && file.size(file) != before) cut_file(file, before)
+  if (file.exists(file) && file.size(file) != before) {
+    replace_content(file, readBin(file, "raw", before))
+  }
   values <- memory$steps[, memory_columns(memory, numbers), drop = FALSE]
   values[, numbers <= memory$count - memory$size] <- 0
   write_bytes(file, writeBin(as.vector(values), raw(), endian = "little"), "ab")
@@ -111,8 +113,6 @@ remove_forgotten <- function(path, key, last, size) {
   numbers <- as.numeric(sub(".*-", "", files))
   unlink(files[(numbers + 1) * size <= last])
 }
-
-cut_file <- function(file, bytes) replace_content(file, readBin(file, "raw", bytes))
 
 #' Read the memory of an agent from its files
 #' @param agent As memory_writer() left it in the checkpoint.

@@ -107,8 +107,7 @@ evaluation_text <- function(row) {
   if (is_exact(row)) {
     return(paste(number_text(row$mean_return), "(exact)"))
   }
-  paste0(number_text(row$mean_return), se_text(row$se), ", 95% interval from ",
-         number_text(row$lower), " to ", number_text(row$upper))
+  paste0(number_text(row$mean_return), se_text(row$se), ", ", interval_text(row$lower, row$upper))
 }
 
 #' @export

@@ -152,8 +152,7 @@ trainings_lines <- function(x) {
 reached_line <- function(reached) {
   interval <- wilson_interval(sum(reached), length(reached))
   paste0("Final evaluations that reach the target: ", sum(reached), " of ", length(reached),
-         " (95% interval from ", percent_text(interval[[1L]]), " to ",
-         percent_text(interval[[2L]]), ")")
+         " (", interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")")
 }
 
 #' @export

@@ -192,6 +192,10 @@ test_that("policies and functions stay, and results give theirs", {
   expect_identical(as_policy(played), played$policy)
   search <- search_random(fake_environment(), rounds = 1, seed = 1)
   expect_identical(as_policy(search), search$policy)
+  trained <- train_agent(
+    agent_hill_climb(), fake_environment(), iterations = 1, seed = 1, eval_episodes = 2
+  )
+  expect_identical(as_policy(trained), trained$policy)
   expect_error(as_policy(network, type = "class"), "no argument for `type`",
                class = "gym_error_argument")
 })
