@@ -176,7 +176,8 @@ dqn_update <- function(policy, state, rows, settings) {
   } else {
     column_max(values_after)
   }
-  wanted <- rows$reward + settings$gamma * ifelse(rows$terminated, 0, best)
+  best[rows$terminated] <- 0
+  wanted <- rows$reward + settings$gamma * best
 
   forward <- forward_layers(layers, policy$activation, rows$inputs)
   outputs <- forward$outputs
