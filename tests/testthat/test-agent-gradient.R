@@ -131,6 +131,21 @@ test_that("random episodes are played before observations are normalized", {
   expect_identical(agent_behavior(begun), begun$policy)
 })
 
+test_that("an iteration is learned from with the moments that it was played with", {
+  # Moments of so many observations that new ones do not change them teach the same.
+  learned <- function(agent, count) {
+    set.seed(1)
+    agent <- started(agent)
+    agent$policy$moments <- new_moments(count, 3, 4 * (count - 1))
+    agent_tell(agent, told(TRUE, 1:6))
+  }
+  for (agent in list(agent_ppo(), agent_reinforce(), agent_dqn(learning_starts = 0))) {
+    few <- learned(agent, 10)
+    expect_identical(coef(few$policy), coef(learned(agent, 1e12)$policy))
+    expect_lt(few$policy$moments$mean, 2.5)
+  }
+})
+
 test_that("how many episodes an iteration has follows from the last one", {
   next_episodes <- function(agent) agent_episodes(agent_tell(started(agent), told(TRUE)), 1)
   # Episodes had three steps; there were two of them.
