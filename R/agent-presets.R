@@ -135,10 +135,7 @@ preset_hints <- function(env, kwargs) {
       paste0("There are presets of ", env, " for other arguments or another agent: ",
              known, ".")
     },
-    i = if (length(kwargs)) {
-      paste0("These were taken for arguments of the environment: ",
-             paste0("`", names(kwargs), "`", collapse = ", "), ".")
-    }
+    unknown_arguments_hint(names(kwargs), NULL)
   )
 }
 

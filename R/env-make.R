@@ -197,6 +197,7 @@ server_env <- R6Class(
     },
     step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
       if (private$closed) check_open(self)
+      check_given(action)
       step_instance(
         private$instance, action, which, named = TRUE, infos = infos, finals = finals
       )
@@ -246,7 +247,7 @@ print_env <- function(env, how, observations, actions) {
   sub_envs <- if (!is.null(env$num_envs)) {
     paste0(", ", count_of(env$num_envs, "sub-environment"), " (", how, ")")
   }
-  cat("<gym_env: ", env$spec$id, sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
+  cat("<gym_env: ", wrapped_id(env$spec$id, env$spec$wrappers), sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
   cat("  observations: ", format(observations), "\n", sep = "")
   cat("  actions:      ", format(actions), "\n", sep = "")
   invisible(env)
@@ -278,7 +279,9 @@ member_or_abort <- function(x, name, call = rlang::caller_env()) {
 
 # R6's own method reads `x$format`, which an environment does not have.
 #' @export
-format.gym_env <- function(x, ...) paste0("<gym_env: ", x$spec$id, ">")
+format.gym_env <- function(x, ...) {
+  paste0("<gym_env: ", wrapped_id(x$spec$id, x$spec$wrappers), ">")
+}
 
 check_open <- function(env, call = rlang::caller_env()) {
   if (!env$is_open) abort_closed(paste0("`gym_make(\"", env$spec$id, "\")` makes a new one."), call)

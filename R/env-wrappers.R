@@ -137,6 +137,9 @@ remembering <- function(names) {
   as.character(intersect(names, c("NormalizeObservation", "NormalizeReward")))
 }
 
+# The name of an environment in prints, with the wrappers around it: returns depend on these, too.
+wrapped_id <- function(env_id, wrappers) paste(c(env_id, wrappers), collapse = " |> ")
+
 #' @export
 format.gym_wrapped <- function(x, ...) {
   paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")

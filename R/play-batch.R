@@ -61,7 +61,9 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
       }
     }
   }
-  with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
+  changed <- watch_policies(batch$policy)
+  with_generator(new_generator(stream = stream), naming_call(play(), vector_env, changed))
+  warn_of_memory(changed())
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
   kept <- mget(c("steps", "frames"), batch)
@@ -72,17 +74,29 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   c(episodes, kept)
 }
 
-# An error of the environment names the user's call, not the internal step.
-naming_call <- function(code, vector_env) {
+# An error names the user's call instead of a step that the user did not take, and its reason in the
+# policy.
+naming_call <- function(code, vector_env, changed = function() NULL) {
   withCallingHandlers(
     code,
     gym_error = function(cnd) {
-      if (is.null(cnd$call) || identical(cnd$call[[1L]], quote(step))) {
-        cnd["call"] <- list(rlang::error_call(vector_env$call))
-        rlang::cnd_signal(cnd)
+      own_step <- is_own_step(cnd$call)
+      hint <- if (own_step && inherits(cnd, "gym_error_space")) {
+        "The policy returned this action."
+      } else if (inherits(cnd, "gym_error_argument") && identical(cnd$argument, "policy")) {
+        memory_hint(changed())
       }
+      if (own_step) cnd["call"] <- list(rlang::error_call(vector_env$call))
+      if (length(hint)) cnd <- with_hint(cnd, hint)
+      if (own_step || length(hint)) rlang::cnd_signal(cnd)
     }
   )
+}
+
+# Was it raised by a reset or a step of this package, not by one that a user wrote?
+is_own_step <- function(call) {
+  own <- list(quote(step), quote(env$step), quote(env$reset))
+  is.null(call) || any(vapply(own, identical, NA, call[[1L]]))
 }
 
 # Plays the episodes from `first` to `last` of a batch. `playing` is the state that changes with
@@ -102,7 +116,6 @@ play_episodes <- function(batch, first, last) {
     candidate = candidate, acting = policy_rows(batch$policy, candidate, batch$sub_env[episode])
   )
   begin_memory(batch$policy, playing$rows$sub_env)
-  changed <- if (is.function(batch$policy) && first == 1L) watch_variables(batch$policy)
   whole <- batch$keep_next || !is.null(batch$learner)
   step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
@@ -113,7 +126,6 @@ play_episodes <- function(batch, first, last) {
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
     }
-    if (!is.null(changed) && playing$taken == 1L) warn_of_memory(changed(), vector_env$call)
     stepped <- if (batch$clips) clip_actions(vector_env$action_space, action) else action
     out <- step(stepped, playing$rows$sub_env)
     if (!is.null(batch$learner)) {
@@ -236,18 +248,20 @@ begin_episodes <- function(batch, episode, last) {
 ask_beforehand <- function(batch, episode, observation, begun = seq_along(episode)) {
   policy <- batch$policy
   vector_env <- batch$vector_env
-  if (vector_env$num_envs == 1L || !(is.function(policy) || inherits(policy, "gym_policy_list"))) {
+  if (vector_env$num_envs == 1L || !(calls_function(policy) || inherits(policy, "gym_policy_list"))) {
     return(invisible())
   }
   for (row in begun[batch$episode[episode[begun]] == 1L]) {
     candidate <- batch$candidate[[episode[[row]]]]
     asked <- policy_subset(policy, candidate)
-    if (is.function(asked) && sum(batch$candidate == candidate) > 1L) {
+    if (calls_function(asked) && sum(batch$candidate == candidate) > 1L) {
       one <- batch_rows(vector_env$observation_space, observation, row)
       ask_about_one(asked, one, vector_env)
     }
   }
 }
+
+calls_function <- function(policy) is.function(policy) || inherits(policy, "gym_policy_memory")
 
 # Frames are kept with one sub-environment, which plays one episode after the other.
 keep_frame <- function(batch, episode) {

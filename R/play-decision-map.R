@@ -85,9 +85,9 @@
 decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path = NULL,
                          xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
                          client = gym_client()) {
-  if (missing(policy)) {
+  if (missing(policy) || inherits(env, c("gym_policy", "gym_training")) || is.function(env)) {
     gym_abort(
-      c("`policy` is missing.",
+      c(if (missing(policy)) "`policy` is missing." else "`env` must be an environment.",
         i = paste("The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;",
                   "without one it is `decision_map(policy = policy)`.")),
       class = "gym_error_argument", argument = "policy", value = NULL

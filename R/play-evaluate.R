@@ -86,8 +86,8 @@ print.gym_evaluation <- function(x, ...) {
     return(invisible(NextMethod()))
   }
   cat(
-    paste0("Evaluation in ", attr(x, "env_id"), ": ", count_of(sum(x$episodes), "episode"), ", ",
-           count_of(sum(x$steps), "step")),
+    paste0("Evaluation in ", wrapped_id(attr(x, "env_id"), attr(x, "provenance")$wrappers), ": ",
+           count_of(sum(x$episodes), "episode"), ", ", count_of(sum(x$steps), "step")),
     paste0("Policy: ", policy_text(attr(x, "policy"))),
     sep = "\n"
   )

@@ -295,8 +295,8 @@ print.gym_rollout <- function(x, ...) {
 rollout_lines <- function(x) {
   returns <- x$episodes$return
   c(
-    paste0("Rollout in ", x$env_id, ": ", count_of(length(returns), "episode"), ", ",
-           count_of(sum(x$episodes$length), "step")),
+    paste0("Rollout in ", wrapped_id(x$env_id, x$provenance$wrappers), ": ",
+           count_of(length(returns), "episode"), ", ", count_of(sum(x$episodes$length), "step")),
     paste0("Policy: ", policy_text(x$policy)),
     if (is.null(x$episodes$candidate)) paste0("Return: ", returns_text(returns))
   )
@@ -319,7 +319,7 @@ returns_text <- function(returns) {
 #' @param object The result of [rollout()].
 #' @param ... Not used.
 #' @return An object of class `summary.gym_rollout`, a list with the elements `env_id` (a string),
-#'   `policy`, `episodes` and `steps` (their numbers, integers), `returns` and `lengths` (the
+#'   `wrappers` (their names), `policy`, `episodes` and `steps` (their numbers, integers), `returns` and `lengths` (the
 #'   quartiles and the mean, named numeric vectors of length 6), `mean` and `se` (the mean return
 #'   and its standard error, doubles; `se` is `NA` for a single episode), `terminated` and
 #'   `truncated` (the numbers of episodes, integers), `candidates` (`NULL`, or for several policies
@@ -332,6 +332,7 @@ summary.gym_rollout <- function(object, ...) {
   structure(
     list(
       env_id = object$env_id,
+      wrappers = object$provenance$wrappers,
       policy = object$policy,
       episodes = nrow(episodes),
       steps = sum(episodes$length),
@@ -350,8 +351,8 @@ summary.gym_rollout <- function(object, ...) {
 #' @export
 print.summary.gym_rollout <- function(x, ...) {
   cat(
-    paste0("Rollout in ", x$env_id, ": ", count_of(x$episodes, "episode"), ", ",
-           count_of(x$steps, "step")),
+    paste0("Rollout in ", wrapped_id(x$env_id, x$wrappers), ": ",
+           count_of(x$episodes, "episode"), ", ", count_of(x$steps, "step")),
     paste0("Policy: ", policy_text(x$policy)),
     if (is.null(x$candidates)) paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
     paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated),

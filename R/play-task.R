@@ -43,9 +43,8 @@ environment_recipe <- function(env, vector_env, arguments) {
 #' @noRd
 new_worker_task <- function(kind, recipe, versions, ...) {
   gym <- as.character(utils::packageVersion("gym"))
-  structure(
-    list(gym = gym, versions = versions, recipe = recipe, ...), class = paste0("gym_task_", kind)
-  )
+  task <- list(gym = gym, versions = versions, recipe = recipe, ...)
+  structure(c(task, list(session = session_objects(task))), class = paste0("gym_task_", kind))
 }
 
 #' Do a task
@@ -60,6 +59,7 @@ do_task <- function(task) {
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
       the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
+      take_session_objects(task$session)
       # As many processes play beside the environment as future gives the worker cores: normally
       # one.
       the_session$server_options$max_rollout_processes <- parallelly::availableCores()[[1L]]

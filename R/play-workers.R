@@ -21,6 +21,9 @@
 #' as future gives the worker cores, normally one. In step-by-step play it runs the sub-environments
 #' in its own process, unless `num_workers` asks for more.
 #'
+#' Functions, such as a policy or that of a wrapper, travel with what they use of the session: its
+#' variables, other functions and attached packages.
+#'
 #' The session itself plays what it cannot send, and says so once: an environment given as an
 #' object, or by a client other than the session's own; wrappers that remember something over
 #' episodes; episodes with frames; agents that learn from each step; a policy, or a wrapper's
@@ -95,10 +98,12 @@ inform_plays_here <- function(reason, hint = NULL) {
   )
 }
 
-# Does an object refer to a connection, a pointer or anything else that only this process has?
+# Does an object, or what its functions use, refer to a connection, a pointer or anything else that
+# only this process has?
 refers_to_process <- function(x) {
   found <- FALSE
-  serialize(x, NULL, refhook = function(part) {
+  used <- if (plan_kind() != "none") session_objects(x)$objects
+  serialize(list(x, used), NULL, refhook = function(part) {
     if (typeof(part) == "externalptr") found <<- TRUE
     NULL
   })

@@ -158,6 +158,7 @@ trainings_title <- function(trainings) {
     return(paste(ids, collapse = ", "))
   }
   x <- trainings[[1L]]
+  where <- wrapped_id(ids, each_training(x)[[1L]]$provenance$wrappers)
   count <- if (inherits(x, "gym_trainings")) paste0(", ", count_of(length(x$trainings), "seed"))
-  paste0(training_label(x), " in ", ids, count)
+  paste0(training_label(x), " in ", where, count)
 }

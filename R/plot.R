@@ -11,7 +11,7 @@ show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = N
   results <- list2env(stats::setNames(arguments[named], names), parent = asNamespace("ggplot2"))
   arguments[named] <- lapply(names, as.name)
   names(arguments)[named] <- ""
-  picture <- eval(as.call(c(quote(autoplot), arguments)), results)
+  picture <- naming_own_call(eval(as.call(c(quote(autoplot), arguments)), results), "autoplot")
   labels <- list(title = if (!is.null(main)) broken_text(main, 38), x = xlab, y = ylab)
   given <- c(!is.null(main), !is.null(xlab), !is.null(ylab))
   picture <- picture + rlang::exec(ggplot2::labs, !!!labels[given])

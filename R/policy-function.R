@@ -21,6 +21,9 @@ check_takes_observations <- function(policy, arg, call) {
 #' @param one A batch of one observation.
 #' @noRd
 ask_about_one <- function(policy, one, vector_env) {
+  if (inherits(policy, "gym_policy_memory")) {
+    policy <- policy_rows(with_memory(policy, 1L), 1L, 1L)
+  }
   tryCatch(
     keep_random_state(act_batch(policy, one, 1L, vector_env)),
     gym_error = function(cnd) rlang::cnd_signal(cnd),
@@ -29,7 +32,8 @@ ask_about_one <- function(policy, one, vector_env) {
         c("The policy failed for a single observation, before the first step.",
           i = observations_hint(vector_env$observation_space),
           i = paste("There may be only one, as when all episodes but one have ended;",
-                    "`drop = FALSE` keeps one row of a matrix a matrix.")),
+                    "`drop = FALSE` keeps one row of a matrix a matrix."),
+          i = if (inherits(policy, "gym_policy_memory")) memory_form(policy$initial)),
         class = c(own_classes(cnd), "gym_error_argument"),
         argument = "policy", value = policy, call = vector_env$call, parent = cnd
       )

@@ -48,14 +48,27 @@
 #'
 #' evaluate_policy("CartPole-v1", pid, episodes = 20, seed = 1)
 policy_memory <- function(act, initial) {
-  takes <- if (is.function(act)) names(formals(args(act)))
-  if (!is.function(act) || !"..." %in% takes && length(takes) < 2L) {
-    abort_argument(act, "a function of `observation` and `memory`", "act", rlang::current_env())
-  }
+  check_takes_memory(act, rlang::current_env())
+  check_given(initial, "It is the memory at the start of an episode, such as `c(sum = 0)`.")
   structure(
     list(act = act, initial = initial_memory(initial, rlang::current_env())),
     class = c("gym_policy_memory", "gym_policy")
   )
+}
+
+check_takes_memory <- function(act, call) {
+  must <- "a function of `observation` and `memory`"
+  if (!is.function(act)) {
+    abort_argument(act, must, "act", call)
+  }
+  takes <- names(formals(args(act)))
+  if (!"..." %in% takes && length(takes) < 2L) {
+    gym_abort(
+      paste0("`act` must be ", must, ", not of ",
+             if (length(takes)) paste0("`", takes, "` alone") else "nothing", "."),
+      class = "gym_error_argument", argument = "act", value = act, call = call
+    )
+  }
 }
 
 # A matrix or a data frame of one row.
@@ -82,7 +95,7 @@ initial_memory <- function(initial, call) {
 #' @export
 format.gym_policy_memory <- function(x, ...) {
   kept <- colnames(x$initial) %||% count_of(ncol(x$initial), "value")
-  paste("with a memory of", paste(kept, collapse = ", "))
+  paste("a function with a memory of", sub("(.*), ", "\\1 and ", toString(kept)))
 }
 
 #' @rdname act
@@ -180,7 +193,26 @@ act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
   batch_actions(said$action, n, vector_env)
 }
 
+# How to reach a number of the memory.
+memory_form <- function(initial) {
+  name <- colnames(initial)[1L]
+  if (is.data.frame(initial)) {
+    paste0("`memory` is a data frame with a row for each episode, such as `memory$", name, "`.")
+  } else {
+    place <- if (is.null(name)) "1" else paste0("\"", name, "\"")
+    paste0("`memory` is a matrix with a row for each episode: `memory[, ", place,
+           "]`. With a list as `initial` it is a data frame.")
+  }
+}
+
 # Functions that remember ------------------------------------------------------------------
+
+# Watches the variables of all functions among the policies.
+watch_policies <- function(policy) {
+  each <- if (inherits(policy, "gym_policy_list")) unclass(policy) else list(policy)
+  watched <- lapply(Filter(is.function, each), watch_variables)
+  function() unlist(lapply(watched, function(changed) changed()))
+}
 
 #' Watch the variables that a function uses outside itself
 #'
@@ -217,15 +249,22 @@ variables_now <- function(place, names) {
   lapply(values, function(x) if (is.environment(x)) as.list(x, sorted = TRUE) else x)
 }
 
-warn_of_memory <- function(changed, call) {
-  if (!length(changed)) {
-    return()
+# A warning for each variable, because the next function that remembers is another mistake.
+warn_of_memory <- function(changed) {
+  if (length(changed)) {
+    rlang::warn(
+      c(paste0("The policy changes `", changed[[1L]], "` outside of itself from call to call: ",
+               "episodes that are played together, or one after the other, share it."),
+        i = "`policy_memory()` makes a policy with a memory for each episode."),
+      class = "gym_warning_memory", .frequency = "once",
+      .frequency_id = paste("gym_policy_changes", changed[[1L]])
+    )
   }
-  rlang::warn(
-    c(paste0("The policy changes `", changed[[1L]], "` outside of itself from call to call: ",
-             "episodes that are played together, or one after the other, share it."),
-      i = "`policy_memory()` makes a policy with a memory for each episode."),
-    class = "gym_warning_memory", call = call, .frequency = "once",
-    .frequency_id = "gym_policy_changes_variables"
-  )
+}
+
+memory_hint <- function(changed) {
+  if (length(changed)) {
+    paste0("It changes `", changed[[1L]], "` from call to call, and each call has other episodes: ",
+           "`policy_memory()` makes a policy with a memory for each.")
+  }
 }

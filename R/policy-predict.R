@@ -20,8 +20,11 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
 #' @exportS3Method
 predict_policy.default <- function(policy, newdata, type, call = rlang::caller_env()) {
   gym_abort(
-    paste0("`predict()` needs the policy to be a network, a table or a model, not ",
-           policy_text(policy), "."),
+    c(paste0("`predict()` needs the policy to be a network, a table or a model, not ",
+             policy_text(policy), "."),
+      i = if (inherits(policy, "gym_policy_memory")) {
+        "`act(policy, observation, memory)` asks it by hand."
+      }),
     class = "gym_error_argument", argument = "object", value = policy, call = call
   )
 }
@@ -30,7 +33,7 @@ predict_policy.default <- function(policy, newdata, type, call = rlang::caller_e
 predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlang::caller_env()) {
   observation <- observations_from(newdata, policy, call)
   if (type == "action") {
-    return(act(policy, observation, draw = FALSE))
+    return(naming_own_call(act(policy, observation, draw = FALSE), "act", call))
   }
   check_network(policy, call)
   values <- observation_rows(observation, policy$observation_space)$values

@@ -133,6 +133,7 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
 # A policy, or a list of policies, which become candidates.
 check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   force(arg)
+  check_given(x, "`policy_random()` is one, and so is a function of observations.", arg, call)
   x <- trained_policy(x)
   if (!is.list(x) || is.object(x)) {
     return(check_policy(x, arg, call))
@@ -203,7 +204,7 @@ policy_text <- function(policy) {
 }
 
 # The text up to the first detail: "random" or "network 4-2-1".
-policy_label <- function(policy) sub("(,| over).*", "", policy_text(policy))
+policy_label <- function(policy) sub("(,| over| of ).*", "", policy_text(policy))
 
 # What rollouts and searches need from a policy ---------------------------------
 

@@ -330,7 +330,9 @@ train_in <- function(vector_env, run, progress, call) {
     bind_with_seed(settings$policy, vector_env, settings$seed, call)
   }
   state <- new_state(settings)
-  state$agent <- with_generator(state$streams$agent, agent_start(settings$agent, bound))
+  state$agent <- with_generator(
+    state$streams$agent, naming_call(agent_start(settings$agent, bound), vector_env)
+  )
   check_is_agent(state$agent, "agent_start()", call)
   if (!is.null(run$file)) state$checkpoint <- training_checkpoint(state, run$file, settings, call)
   if (!is.null(run$log)) state$log <- training_log(run$log, settings, state, call)

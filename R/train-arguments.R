@@ -24,7 +24,7 @@ check_training <- function(settings, call) {
   )
   check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
   if (is.null(settings$iterations) && is.null(settings$total_steps)) {
-    abort_no_budget(call = call)
+    abort_no_budget(unknown_arguments_hint(names(settings$kwargs), settings$agent), call)
   }
   if (!is.null(settings$callback) && !is.function(settings$callback)) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
@@ -64,6 +64,21 @@ abort_no_budget <- function(hints = NULL, call) {
   gym_abort(
     c("Training needs a budget: give `iterations`, or `total_steps` of the environment.", hints),
     class = "gym_error_argument", argument = "iterations", call = call
+  )
+}
+
+# The names of arguments that train_agent() does not know: of the agent, misspelt, or really of the
+# environment.
+unknown_arguments_hint <- function(names, agent) {
+  of_agent <- unlist(lapply(names, nearest_name, names(agent)))
+  c(
+    i = if (length(names)) {
+      paste0("These were taken for arguments of the environment: ",
+             paste0("`", names, "`", collapse = ", "), ".")
+    },
+    i = if (length(of_agent)) {
+      paste0("An argument of the agent goes into its parentheses: `", of_agent[[1L]], "`.")
+    }
   )
 }
 

@@ -60,8 +60,8 @@ run_scores <- function(trainings, curves, steps, call) {
   at <- steps %||% if (same && length(trainings)) budgets else min(ends)
   if (at > min(ends)) {
     gym_abort(
-      c(paste0("Not all runs have taken ", number_text(at), " steps."),
-        i = paste0("The shortest ended after ", number_text(min(ends)), ".")),
+      c(paste0("Not all runs have taken ", whole_number_text(at), " steps."),
+        i = paste0("The shortest ended after ", whole_number_text(min(ends)), ".")),
       class = "gym_error_argument", argument = "steps", value = at, call = call
     )
   }

@@ -7,7 +7,10 @@ compare_by_steps <- function(trainings, level) {
       training = label, env_id = vapply(ones, function(one) one$env_id, ""),
       seed = vapply(ones, function(one) as.numeric(one$seed), 0),
       steps = vapply(ones, function(one) as.numeric(one$steps), 0),
-      reached = vapply(ones, function(one) one$solved, NA)
+      # The last iterations may reach the target without an evaluation that could end the training.
+      reached = vapply(ones, function(one) {
+        one$solved || reaches(one$final$mean_return %||% NA, one$target)
+      }, NA)
     )
   }, trainings, names(trainings))))
   key <- paste(runs$training, runs$env_id, sep = "\r")

@@ -28,9 +28,10 @@
 #' # Steps to a target
 #'
 #' Trainings that stop at a target all score about that target. They are compared by the steps that
-#' they needed to reach it. A run that did not reach it is censored: it needs more steps than it
-#' had. The share of runs that have reached the target after so many steps is estimated as in Kaplan
-#' and Meier (1958), with Greenwood's variance on the scale of log(-log).
+#' they needed to reach it. A run whose final evaluation reached it needed all of its steps. A run
+#' that did not reach it is censored: it needs more steps than it had. The share of runs that have
+#' reached the target after so many steps is estimated as in Kaplan and Meier (1958), with
+#' Greenwood's variance on the scale of log(-log).
 #'
 #' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
 #'   one agent in several environments have the same name. Or one data frame as returned by
@@ -93,6 +94,7 @@ compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, 
   given <- name_results(list(...), as.list(substitute(list(...)))[-1L])
   curves <- if (length(given) == 1L && is.data.frame(given[[1L]])) given[[1L]]
   trainings <- if (is.null(curves)) {
+    check_are_trainings(given, call)
     given_trainings(given, call, unique = FALSE)
   } else {
     check_curves(curves, call)
@@ -124,6 +126,27 @@ curves_of <- function(trainings) {
     rows <- curve_rows(x, label, NULL)
     cbind(training = rep(label, nrow(rows)), rows)
   }, trainings, names(trainings))))
+}
+
+check_are_trainings <- function(given, call) {
+  wrong <- Filter(function(x) {
+    !inherits(x, c("gym_training", "gym_trainings", "gym_searches"))
+  }, given)
+  if (!length(wrong)) {
+    return()
+  }
+  name <- names(wrong)[[1L]]
+  near <- nearest_name(name, setdiff(names(formals(compare_trainings)), "..."))
+  several <- is.list(wrong[[1L]]) &&
+    any(vapply(wrong[[1L]], inherits, NA, c("gym_training", "gym_trainings")))
+  gym_abort(
+    c(paste0(if (nzchar(name)) paste0("`", name, "`") else "Each argument",
+             " must be a training, not ", describe_argument(wrong[[1L]]), "."),
+      i = if (nzchar(name) && length(near)) paste0("Did you mean `", near, "`?"),
+      i = if (inherits(wrong[[1L]], "gym_sweep")) "`sweep$comparison` compares its settings.",
+      i = if (several) "`do.call(compare_trainings, x)` compares the trainings of a list."),
+    class = "gym_error_argument", argument = "...", value = wrong[[1L]], call = call
+  )
 }
 
 # All have a target or none has: otherwise there is nothing to compare them by.
@@ -194,16 +217,35 @@ print.gym_comparison <- function(x, ...) {
   invisible(x)
 }
 
-# A training ends with the iteration that reaches its budget.
+# A training ends with the iteration that reaches its budget. With many trainings, those of all.
 steps_taken_line <- function(runs) {
-  taken <- split(runs$steps, factor(runs$training, unique(runs$training)))
+  of_few <- length(unique(runs$training)) <= 4L
+  taken <- if (of_few) {
+    split(runs$steps, factor(runs$training, unique(runs$training)))
+  } else {
+    list(runs$steps)
+  }
   ranges <- vapply(taken, function(steps) {
     paste(unique(vapply(range(steps), whole_number_text, "")), collapse = " to ")
   }, "")
-  paste("Steps taken:", paste(names(ranges), ranges, collapse = "; "))
+  paste("Steps taken:", paste0(names(ranges), if (of_few) " ", ranges, collapse = "; "))
 }
 
-comparison_lines <- function(x) {
+# `n` trainings have n * (n - 1) / 2 pairs.
+most_pairs_shown <- 6L
+
+improvement_lines <- function(pairs, interval) {
+  if (NROW(pairs) > most_pairs_shown) {
+    return(paste0("Probabilities of ", nrow(pairs), " pairs: the element `improvement`, and ",
+                  "`plot(type = \"improvement\")`"))
+  }
+  if (NROW(pairs)) {
+    paste0("Probability that ", pairs$training, " scores higher than ", pairs$than, ": ",
+           interval(pairs$probability, pairs$lower, pairs$upper))
+  }
+}
+
+comparison_lines <- function(x, pairs = TRUE) {
   scores <- x$by == "scores"
   ids <- unique(x$runs$env_id)
   seeds <- unique(range(runs_each(x$runs)))
@@ -241,11 +283,7 @@ comparison_lines <- function(x) {
       percent_text(x$level), " intervals: ",
       if (scores) paste0("stratified bootstrap, ", count_of(x$reps, "draw")) else "Kaplan-Meier"
     ),
-    if (NROW(x$improvement)) {
-      pair <- x$improvement
-      paste0("Probability that ", pair$training, " scores higher than ", pair$than, ": ",
-             interval(pair$probability, pair$lower, pair$upper))
-    },
+    if (pairs) improvement_lines(x$improvement, interval),
     paste0("Note: ", x$notes, recycle0 = TRUE)
   )
 }

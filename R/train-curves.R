@@ -17,9 +17,9 @@
 #' The training returns in these programs' logs are not evaluations: actions are drawn, and the
 #' returns are often means of the last 100 episodes. Their `kind` is `"training"`.
 #'
-#' @param ... Trainings of class `gym_training` or [gym_trainings], and folders or files, strings.
-#'   The name of an argument becomes its `training`; without a name it is that of the variable, the
-#'   file, or the agent.
+#' @param ... Trainings of class `gym_training` or [gym_trainings], results of [sweep_agent()], and
+#'   folders or files, strings. The name of an argument becomes its `training`; without a name it is
+#'   that of the variable, the file, or the agent. In a sweep it is that of the setting.
 #' @return A data frame with a row for each evaluation: `training`, `env_id` (strings, `NA` if the
 #'   log does not have it), `seed` (a whole number; for other programs the one in a name such as
 #'   `seed-3` or CleanRL's `CartPole-v1__ppo__3__1700000000`, otherwise the run's number),
@@ -36,7 +36,7 @@
 #' learning_curves(ars)
 learning_curves <- function(...) {
   call <- rlang::current_env()
-  given <- name_results(list(...), as.list(substitute(list(...)))[-1L])
+  given <- with_settings(name_results(list(...), as.list(substitute(list(...)))[-1L]))
   rows <- Map(function(x, label) {
     rows <- curve_rows(x, label, call)
     cbind(training = rep(label, nrow(rows)), rows)
@@ -44,6 +44,14 @@ learning_curves <- function(...) {
   table <- do.call(rbind, c(list(cbind(training = character(), no_curve)), unname(rows)))
   row.names(table) <- NULL
   table
+}
+
+# Each setting of a sweep is a training with its own name.
+with_settings <- function(given) {
+  do.call(c, unname(Map(function(x, label) {
+    own <- if (inherits(x, "gym_sweep")) x$trainings else stats::setNames(list(x), label)
+    Filter(Negate(is.null), own)
+  }, given, names(given))))
 }
 
 no_curve <- data.frame(

@@ -84,7 +84,8 @@ training_lines <- function(x) {
   outcome <- if (x$interrupted) "Interrupted after" else if (x$solved) "Solved after" else "Played"
   target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
   c(
-    paste0("Training in ", x$env_id, " by ", if (search) "random search" else format(x$agent)),
+    paste0("Training in ", wrapped_id(x$env_id, x$provenance$wrappers), " by ",
+           if (search) "random search" else format(x$agent)),
     paste0("Policy: ", policy_text(x$policy %||% x$template)),
     paste0(
       outcome, " ", count_of(nrow(x$history), if (search) "round" else "iteration"), ", ",

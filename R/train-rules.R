@@ -38,17 +38,20 @@ environment_settings <- function(one) {
 # `NULL` if all trainings have the same rules.
 unequal_text <- function(what, rules, names) {
   value <- function(of_one, name) {
-    value <- of_one[[name]] %||% "none"
-    if (is.numeric(value)) marked_text(value, scientific = FALSE) else value
+    value <- of_one[[name]]
+    if (is.null(value)) {
+      return(paste("no", name))
+    }
+    text <- if (is.numeric(value)) marked_text(value, scientific = FALSE) else value
+    if (name == "target") text else paste(name, text)
   }
   differ <- Filter(function(name) {
     length(unique(vapply(rules, value, "", name))) > 1L
   }, names)
   if (length(differ)) {
     texts <- vapply(rules, function(of_one) {
-      values <- vapply(differ, value, "", of_one = of_one)
-      paste(if (identical(names, "target")) values else paste(differ, values), collapse = ", ")
+      toString(vapply(differ, value, "", of_one = of_one))
     }, "")
-    paste0(what, " differ: ", paste(names(rules), texts, collapse = "; "))
+    paste0(what, " differ: ", paste0(names(rules), ": ", texts, collapse = "; "))
   }
 }

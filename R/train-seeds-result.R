@@ -132,7 +132,8 @@ trainings_lines <- function(x) {
   # With `target = Inf` nothing can be solved.
   has_target <- !is.null(x$target) && is.finite(x$target)
   c(
-    paste0("Training in ", x$env_id, " by ", format(x$agent)),
+    paste0("Training in ", wrapped_id(x$env_id, x$trainings[[1L]]$provenance$wrappers), " by ",
+           format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
     if (nrow(done) && has_target) {
       paste0("Solved with ", sum(done$solved), " of ", count_of(nrow(done), "seed"), " (target ",

@@ -11,7 +11,7 @@
 #'
 #' The best setting is the one with the highest interquartile mean. If trainings stop at a target,
 #' it is the one with which most runs reached it, or, of equal ones, the one with the smallest
-#' median of steps.
+#' median of steps; there is none if no run reached it.
 #'
 #' With `folder` each run is kept in a file. After an interrupt, a crash or an error, the same call
 #' resumes with the missing runs. You may add settings.
@@ -42,7 +42,7 @@
 #'       or `NA`).}
 #'     \item{comparison}{The result of [compare_trainings()] for the settings, `NULL` if none was
 #'       trained.}
-#'     \item{best}{The name of the best setting.}
+#'     \item{best}{The name of the best setting, or `NULL`.}
 #'     \item{reported}{Its [gym_trainings] with `report_seeds`, or `NULL`.}
 #'     \item{seeds, report_seeds}{As given.}
 #'     \item{interrupted}{Whether it was interrupted, a logical.}
@@ -63,6 +63,7 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
                         progress = rlang::is_interactive(), client = gym_client()) {
   call <- rlang::current_env()
   check_sweep(agent, settings, seeds, report_seeds, folder, call)
+  settings <- as.data.frame(settings)
   settings$setting <- setting_names(settings)
   agents <- lapply(seq_len(nrow(settings)), function(row) {
     arguments <- lapply(settings[row, names(settings) != "setting", drop = FALSE], `[[`, 1L)
@@ -102,9 +103,19 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
     must <- "the function that makes the agent, such as `agent_ars` without parentheses"
     abort_argument(agent, must, "agent", call)
   }
+  if ("env" %in% names(formals(agent))) {
+    gym_abort(
+      c("`agent` must be the function that makes the agent, not one that trains it.",
+        i = "Give `agent_ars` instead of `search_ars`, `agent_ppo` instead of `learn_ppo`."),
+      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    )
+  }
+  check_given(settings, "`expand.grid(step_size = c(0.02, 0.1))` has a row for each.", call = call)
   if (!is.data.frame(settings) || !nrow(settings) || !length(settings)) {
     abort_argument(settings, "a data frame with a row for each setting", "settings", call)
   }
+  check_settings(names(settings), names(formals(agent)), call)
+  check_given(seeds, "They are the seeds for tuning, such as `1:10`.", call = call)
   check_seeds(seeds, call)
   check_string(folder, allow_null = TRUE, arg = "folder", call = call)
   if (!is.null(report_seeds)) {
@@ -117,6 +128,19 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
         class = "gym_error_argument", argument = "report_seeds", value = report_seeds, call = call
       )
     }
+  }
+}
+
+check_settings <- function(names, known, call) {
+  unknown <- setdiff(names, known)
+  if (length(unknown) && !"..." %in% known) {
+    near <- nearest_name(unknown[[1L]], known)
+    gym_abort(
+      c(paste0("The agent has no argument `", unknown[[1L]], "`, a column of `settings`."),
+        i = if (length(near)) paste0("Did you mean `", near, "`?"),
+        i = paste0("It has ", paste0("`", known, "`", collapse = ", "), ".")),
+      class = "gym_error_argument", argument = "settings", value = unknown, call = call
+    )
   }
 }
 
@@ -208,7 +232,8 @@ best_setting <- function(comparison) {
     table <- table[table$statistic == "iqm", ]
     table$training[[which.max(table$value)]]
   } else {
-    table$training[[order(-table$reached / table$runs, table$median)[[1L]]]]
+    first <- order(-table$reached / table$runs, table$median)[[1L]]
+    if (table$reached[[first]] > 0L) table$training[[first]]
   }
 }
 
@@ -237,16 +262,16 @@ print.gym_sweep <- function(x, ...) {
     paste0("Sweep of ", count_of(nrow(x$settings), "setting"),
            if (x$interrupted) ", interrupted: the same call goes on where it has a folder"),
     paste0("Tuning seeds: ", numbers_text(x$seeds), ", which chose the setting"),
-    if (!is.null(x$comparison)) comparison_lines(x$comparison),
+    if (!is.null(x$comparison)) comparison_lines(x$comparison, pairs = FALSE),
     if (nrow(failed)) {
       paste0(count_of(nrow(failed), "run"), " failed, the first, ", failed$setting[[1L]], ": ",
              sub("\n.*", "", failed$error[[1L]]))
     },
-    if (!is.null(x$best)) paste0("Best: ", x$best),
+    paste0("Best: ", x$best %||% "none, no run reached the target"),
     if (!is.null(x$reported)) {
       c(paste0("Reporting seeds: ", numbers_text(x$report_seeds), ", which chose nothing"),
         paste0("  ", trainings_lines(x$reported)[-(1:2)]))
-    } else {
+    } else if (!is.null(x$best)) {
       "No reporting seeds: for the best setting these figures are too good, see `report_seeds`"
     },
     sep = "\n"

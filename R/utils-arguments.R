@@ -1,6 +1,16 @@
 # Checks of arguments. Each returns its value, invisibly, or aborts with `gym_error_argument`, which
 # names the argument and its value.
 
+# R's own error for a missing argument names a function that the user has not called.
+check_given <- function(x, hint = NULL, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
+  if (missing(x)) {
+    gym_abort(
+      c(paste0("`", arg, "` is missing."), i = hint), class = "gym_error_argument", argument = arg,
+      call = call
+    )
+  }
+}
+
 check_count <- function(x, min = 1, max = .Machine$integer.max, allow_null = FALSE,
                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (allow_null && is.null(x)) {

@@ -30,15 +30,23 @@ naming_own_call <- function(code, of, call = rlang::caller_env()) {
   withCallingHandlers(code, gym_error = function(cnd) rlang::cnd_signal(rename(cnd)))
 }
 
+# Adds a hint to an error that was raised by a function that does not know the reason.
+with_hint <- function(cnd, hint) {
+  cnd$message <- paste0(cnd$message, "\n", rlang::format_error_bullets(c(i = hint)))
+  cnd
+}
+
 # `path` is the place of the wrong part in the whole value; it is "" for the whole.
 abort_space <- function(space, value, problem, call, path = "") {
   place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")
+  found <- if (is.data.frame(value)) {
+    paste(if (is.null(place)) "A" else sub("the$", "a", place), "data frame with",
+          count_of(nrow(value), "row"), "and", count_of(ncol(value), "column"))
+  } else {
+    paste(place %||% "The", "value", describe_value(value))
+  }
   gym_abort(
-    c(
-      paste0(problem, "."),
-      x = paste0(place %||% "The", " value ", describe_value(value), " does not fit the space ",
-                 format(space), ".")
-    ),
+    c(paste0(problem, "."), x = paste0(found, " does not fit the space ", format(space), ".")),
     class = "gym_error_space",
     space = space,
     value = value,
@@ -52,9 +60,8 @@ describe_value <- function(value) {
     # deparse() would show its bits as a double.
     return(paste("the integer64", describe_value(double_from_integer64(value))))
   }
-  if (is.data.frame(value)) {
-    return(paste("of a data frame with", count_of(nrow(value), "row"), "and",
-                 count_of(ncol(value), "column")))
+  if (is.atomic(value) && length(value) == 1L && is.na(value) && !is.nan(value)) {
+    return("NA")
   }
   text <- paste(deparse(value, width.cutoff = 60L, nlines = 3L), collapse = " ")
   if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text

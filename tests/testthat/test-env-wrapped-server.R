@@ -114,7 +114,7 @@ test_that("a wrapper of the server's over one in R is refused, and so are calls 
   expect_error(gym_wrap("CartPole-v1", "TransformReward", f = sqrt), "has no argument `f`")
   expect_error(gym_wrap("CartPole-v1", "TransformReward", function(r) r), "as `func = function")
   expect_error(gym_wrap("CartPole-v1", "RewardWrapper", func = function(r) r),
-               "takes no function of R", class = "gym_error_argument")
+               "does not take an R function", class = "gym_error_argument")
   lake <- gym_wrap("FrozenLake-v1", "TransformReward", func = function(r) r)
   expect_error(env_model(lake), class = "gym_error_no_model")
   bad <- gym_wrap("CartPole-v1", "TransformReward", func = function(r) r[-1])
@@ -201,4 +201,25 @@ test_that("it is said once that R plays step by step", {
   expect_identical(nrow(check_env(wrapped)), 0L)
   drawn <- rollout(wrapped, lean, seed = 1, max_steps = 2, frames = TRUE)
   expect_length(drawn$frames[[1]], 3)
+})
+
+test_that("a misspelt wrapper for functions is named", {
+  expect_error(gym_wrap("CartPole-v1", "TransformRewards", func = identity),
+               "Did you mean TransformReward", class = "gym_error_argument")
+})
+
+test_that("prints name the wrappers, which are part of every return", {
+  shaped <- gym_wrap("CartPole-v1", "TransformReward", func = function(reward) 2 * reward)
+  client <- test_client()
+  text <- "CartPole-v1 |> TransformReward"
+  played <- rollout(shaped, policy_random(), episodes = 2, seed = 1, client = client)
+  trained <- train_agent(agent_ars(), shaped, iterations = 1, max_steps = 5, eval_episodes = 2,
+                         target = Inf, seed = 1, client = client)
+  evaluated <- evaluate_policy(shaped, policy_random(), episodes = 2, seed = 1, client = client)
+  made <- gym_make(shaped, client = client)
+  for (x in list(played, summary(played), trained, evaluated, made)) {
+    expect_output(print(x), text, fixed = TRUE)
+  }
+  made$close()
+  expect_match(ggplot2::autoplot(trained)$labels$title, "TransformReward")
 })

@@ -263,6 +263,38 @@ test_that("an error of a policy on a worker is that of the call, and workers go 
   expect_identical(nrow(rollout("Acrobot-v1", drawing, 4, seed = 1, max_steps = 5)$episodes), 4L)
 })
 
+test_that("functions travel with what they use of the session", {
+  skip_unless_all()
+  # The functions of a user's session are in the global environment.
+  define <- quote({
+    gym_test_limit <- 0.5
+    gym_test_list <- list(above = function(x) x > gym_test_limit)
+    gym_test_policy <- function(observation) 2 * gym_test_list$above(observation[, 1])
+    gym_test_shift <- 5
+    gym_test_reward <- function(reward) reward + gym_test_shift
+  })
+  eval(define, globalenv())
+  withr::defer(rm(list = c("gym_test_limit", "gym_test_list", "gym_test_policy", "gym_test_shift",
+                           "gym_test_reward"), envir = globalenv()))
+  play <- function() {
+    policy <- get("gym_test_policy", globalenv())
+    shaped <- gym_wrap("Acrobot-v1", "TransformReward", func = get("gym_test_reward", globalenv()))
+    remembers <- policy_memory(function(observation, memory) {
+      list(action = policy(observation), memory = memory)
+    }, 0)
+    suppressMessages(list(
+      rollout(shaped, policy, 4, seed = 1, max_steps = 20)$episodes,
+      rollout("Acrobot-v1", remembers, 4, seed = 1, max_steps = 20)$episodes,
+      coef(train_agent(agent_ars(directions = 2, top = 2), shaped, iterations = 1, seeds = 1:2,
+                       max_steps = 20, eval_episodes = 2, target = Inf))
+    ))
+  }
+  alone <- play()
+  local_plan(future::multisession, workers = 2)
+  expect_no_message(there <- play(), class = "gym_message_plays_here")
+  expect_identical(there, alone)
+})
+
 test_that("seeds are trained by workers, each with its own files", {
   skip_unless_all()
   trained <- function(...) {

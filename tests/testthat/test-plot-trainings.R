@@ -60,7 +60,7 @@ test_that("trainings that are given together are compared, by their names", {
   # Different targets are no line, and the caption says so.
   other <- training_of(c(10, 30), 1:2, target = 9)
   expect_identical(key_of(autoplot(ars, other)), c("ars", "other"))
-  expect_match(autoplot(ars, other)$labels$caption, "targets differ: ars 5; other 9", fixed = TRUE)
+  expect_match(autoplot(ars, other)$labels$caption, "targets differ: ars: 5; other: 9", fixed = TRUE)
   expect_error(plot(ars, 3), class = "gym_error_argument")
   expect_error(autoplot(ars, col = 3), "no argument for `col`", class = "gym_error_argument")
 })
@@ -88,12 +88,12 @@ test_that("a comparison names other budgets and rules of evaluation", {
   long <- one(total_steps = 5e4, eval_episodes = 100)
   expect_null(autoplot(short, again = short)$labels$caption)
   expect_identical(captions(short, long),
-                   "budgets differ: short total_steps 20,000; long total_steps 50,000")
+                   "budgets differ: short: total_steps 20,000; long: total_steps 50,000")
   seldom <- one(total_steps = 2e4, eval_episodes = 20, max_steps = 9)
   expect_identical(
     captions(short, seldom),
-    paste("rules of evaluation differ: short max_steps none, eval_episodes 100;",
-          "seldom max_steps 9, eval_episodes 20")
+    paste("rules of evaluation differ: short: no max_steps, eval_episodes 100;",
+          "seldom: max_steps 9, eval_episodes 20")
   )
   # Targets of several environments are different ones.
   elsewhere <- short

@@ -88,7 +88,9 @@ test_that("what has no memory to keep is refused in one sentence with an example
     cnd <- expect_error(code, class = "gym_error_argument")
     expect_match(conditionMessage(cnd), text, fixed = TRUE)
   }
-  refused(policy_memory(function(observation) 1, 0), "a function of `observation` and `memory`")
+  refused(policy_memory(function(observation) 1, 0),
+          "a function of `observation` and `memory`, not of `observation` alone")
+  refused(policy_memory(summing$act), "`initial` is missing")
   refused(policy_memory(summing$act, list(a = 1:2)), "the memory of one episode")
   refused(policy_memory(summing$act, NULL), "the memory of one episode")
   play <- function(act) {
@@ -106,8 +108,11 @@ test_that("what has no memory to keep is refused in one sentence with an example
 })
 
 test_that("a function that remembers by itself is warned of once, one that does not is not", {
-  rlang::reset_warning_verbosity("gym_policy_changes_variables")
-  withr::defer(rlang::reset_warning_verbosity("gym_policy_changes_variables"))
+  withr::defer({
+    for (name in c("total", "kept", "count")) {
+      rlang::reset_warning_verbosity(paste("gym_policy_changes", name))
+    }
+  })
   total <- 0
   leaks <- function(observation) {
     total <<- total + 1
@@ -120,10 +125,50 @@ test_that("a function that remembers by itself is warned of once, one that does 
   expect_no_warning(play(function(observation) scale * observation[, 1]))
   expect_warning(play(leaks), "changes `total`.*policy_memory", class = "gym_warning_memory")
   expect_no_warning(play(leaks))
-  rlang::reset_warning_verbosity("gym_policy_changes_variables")
+  # Another function is another mistake, also among several policies.
   kept <- new.env()
   expect_warning(
     play(function(observation) kept$last <- observation[, 1]), "changes `kept`",
     class = "gym_warning_memory"
   )
+  count <- 0
+  counts <- function(observation) {
+    count <<- count + 1
+    observation[, 1]
+  }
+  expect_warning(play(list(summing, counts)), "changes `count`", class = "gym_warning_memory")
+})
+
+test_that("the error of a function that remembers says why", {
+  last <- 0
+  difference <- function(observation) {
+    changed <- observation[, 1] - last
+    last <<- observation[, 1]
+    changed
+  }
+  env <- fake_vector_env(3, ends = ends, action_space = box)
+  expect_error(
+    rollout(env, difference, episodes = 6, seed = 1),
+    "changes `last` from call to call.*policy_memory", class = "gym_error_argument"
+  )
+})
+
+test_that("a mistake in the function is found before the first step, with what a memory is", {
+  counting <- function(initial) {
+    policy_memory(function(observation, memory) {
+      memory$n <- memory$n + 1
+      list(action = memory$n, memory = memory)
+    }, initial)
+  }
+  play <- function(policy) rollout(fake_vector_env(2, action_space = box), policy, episodes = 2)
+  expect_identical(nrow(play(counting(list(n = 0)))$episodes), 2L)
+  expect_error(play(counting(c(n = 0))), "memory\\[, \"n\"\\]", class = "gym_error_argument")
+})
+
+test_that("it prints what it remembers", {
+  expect_identical(format(policy_memory(summing$act, c(a = 0, b = 0, c = 0))),
+                   "a function with a memory of a, b and c")
+  expect_identical(policy_label(summing), "a function with a memory")
+  expect_error(predict(summing, c(1, 2)), "act(policy, observation, memory)", fixed = TRUE,
+               class = "gym_error_argument")
 })

@@ -92,8 +92,59 @@ test_that("an error names the function that was called, not one that this calls"
     if (asked > 12) "left" else integer(length(observation))
   }
   cnd <- expect_error(
-    evaluate_policy(corridor, failing, episodes = 300, seed = 1), class = "gym_error_rollout"
+    while_counting(evaluate_policy(corridor, failing, episodes = 300, seed = 1)),
+    class = "gym_error_rollout"
   )
   expect_identical(cnd$call[[1L]], quote(evaluate_policy))
   expect_identical(cnd$parent$call[[1L]], quote(evaluate_policy))
+})
+
+corridor <- gym_env(
+  reset = function(self) 0,
+  step = function(self, action) list(observation = 0, reward = 1, terminated = TRUE),
+  observation_space = space_discrete(1), action_space = space_discrete(2)
+)
+
+test_that("an action that a policy returns and that is none is the policy's, not a step's", {
+  none <- function(observation) rep(NA, NROW(observation))
+  for (env in list(corridor, local_env("CartPole-v1"), local_env("CartPole-v1", num_envs = 2))) {
+    cnd <- expect_error(rollout(env, none, 2),
+                        "The value NA does not fit.*The policy returned this action",
+                        class = "gym_error_space")
+    expect_identical(cnd$call[[1L]], quote(rollout))
+  }
+})
+
+test_that("a missing argument is named", {
+  expect_error(rollout(corridor), "`policy` is missing", class = "gym_error_argument")
+  cnd <- expect_error(evaluate_policy(corridor), "`policy` is missing", class = "gym_error_argument")
+  expect_identical(cnd$call[[1L]], quote(evaluate_policy))
+  expect_error(local_env("CartPole-v1")$step(), "`action` is missing", class = "gym_error_argument")
+})
+
+test_that("an error of a picture names plot()", {
+  trained <- train_agent(agent_hill_climb(), fake_environment(), iterations = 1, eval_episodes = 2,
+                         target = Inf, seed = 1)
+  cnd <- expect_error(plot(trained, type = "decision"), class = "gym_error_argument")
+  expect_identical(cnd$call[[1L]], quote(plot))
+})
+
+test_that("a misspelt argument of the agent is named where the budget is missing", {
+  expect_error(train_agent(agent_ars(), fake_environment(), stepsize = 0.1),
+               "`stepsize`.*goes into its parentheses: `step_size`", class = "gym_error_argument")
+})
+
+test_that("the request stands in the error's parent, not in its text", {
+  env <- local_env("CartPole-v1")
+  env$reset()
+  cnd <- expect_error(env$step(3), "not in Discrete(2)", fixed = TRUE)
+  own <- paste(c(cnd$message, cnd$body), collapse = "\n")
+  expect_false(grepl("POST", own))
+  expect_match(conditionMessage(cnd$parent), "POST http.*/step/ \\[400 Bad Request\\]")
+})
+
+test_that("a table for observations that cannot be counted is refused by the call", {
+  cnd <- expect_error(learn_q("CartPole-v1", total_steps = 10, client = test_client()),
+                      "cannot", class = "gym_error_argument")
+  expect_identical(cnd$call[[1L]], quote(learn_q))
 })

@@ -10,7 +10,7 @@ trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, solv
           mean_return = c(0, curve %||% score, score), se = 0, lower = 0, upper = 0, episodes = 9L
         ),
         agent = agent_ars(), target = target, env_id = env_id, seed = seed, steps = steps,
-        solved = solved, interrupted = FALSE, rules = list(total_steps = total_steps)
+        solved = solved, final = data.frame(mean_return = score), interrupted = FALSE, rules = list(total_steps = total_steps)
       ),
       class = "gym_training"
     )
@@ -130,11 +130,11 @@ test_that("other arguments and wrappers of the environment are named", {
   }
   expect_identical(
     with_one("kwargs", list(max_episode_steps = 100)),
-    "environments differ: plain arguments none; changed arguments max_episode_steps = 100"
+    "environments differ: plain: no arguments; changed: arguments max_episode_steps = 100"
   )
   expect_identical(
     with_one("provenance", list(wrappers = "TransformReward")),
-    "environments differ: plain wrappers none; changed wrappers TransformReward"
+    "environments differ: plain: no wrappers; changed: wrappers TransformReward"
   )
   expect_null(with_one("kwargs", list()))
 })
@@ -174,9 +174,9 @@ test_that("scores of several environments are between random policy and threshol
 })
 
 test_that("trainings that stop at a target are compared by steps, failures censored", {
-  quick <- trainings_with(rep(9, 6), target = 9, steps = c(10, 20, 30, 30, 50, 60),
+  quick <- trainings_with(c(9, 9, 9, 5, 9, 5), target = 9, steps = c(10, 20, 30, 30, 50, 60),
                           solved = c(TRUE, TRUE, TRUE, FALSE, TRUE, FALSE))
-  slow <- trainings_with(rep(9, 6), target = 9, steps = c(40, 60, 60, 60, 60, 60),
+  slow <- trainings_with(c(9, rep(5, 5)), target = 9, steps = c(40, 60, 60, 60, 60, 60),
                          solved = c(TRUE, rep(FALSE, 5)))
   compared <- compare_trainings(quick, slow)
   expect_identical(compared$by, "steps")
@@ -189,8 +189,33 @@ test_that("trainings that stop at a target are compared by steps, failures censo
   inf <- trainings_with(1:5)
   expect_error(compare_trainings(quick, inf), "target = Inf", class = "gym_error_argument")
   other <- trainings_with(rep(9, 6), target = 8, steps = 10, solved = TRUE)
-  expect_match(compare_trainings(quick, other)$notes, "targets differ: quick 9; other 8",
+  expect_match(compare_trainings(quick, other)$notes, "targets differ: quick: 9; other: 8",
                all = FALSE)
+})
+
+test_that("a run whose final evaluation reaches the target has reached it", {
+  late <- trainings_with(c(9, 9, 8), target = 9, steps = c(10, 20, 30), solved = rep(FALSE, 3))
+  compared <- suppressWarnings(compare_trainings(late), classes = "gym_warning_seeds")
+  expect_identical(compared$runs$reached, c(TRUE, TRUE, FALSE))
+})
+
+test_that("what is no training is named, with what it was meant to be", {
+  some <- trainings_with(1:5)
+  refused <- function(code, text) {
+    expect_error(code, text, fixed = TRUE, class = "gym_error_argument")
+  }
+  refused(compare_trainings(x = some, step = 3), "Did you mean `steps`?")
+  refused(compare_trainings(x = some, y = 3), "`y` must be a training, not 3.")
+  refused(compare_trainings(list(some, some)), "do.call(compare_trainings, x)")
+  refused(compare_trainings(x = some, steps = 1e6), "have taken 1,000,000 steps")
+})
+
+test_that("many pairs are not printed", {
+  all <- lapply(stats::setNames(nm = letters[1:5]), function(name) trainings_with(1:5))
+  compared <- do.call(compare_trainings, all)
+  expect_identical(nrow(compared$improvement), 10L)
+  expect_output(print(compared), "Probabilities of 10 pairs")
+  expect_lt(length(capture.output(print(compared))), 15)
 })
 
 test_that("the estimate of Kaplan and Meier is that of package survival", {

@@ -81,6 +81,26 @@ test_that("arguments of a sweep are checked", {
   bad(agent_ars, env, list(noise = 1), 1:5, iterations = 1)
   bad(agent_ars, env, data.frame(noise = 1), c(1, 1), iterations = 1)
   bad(agent_ars, env, data.frame(noise = 1), 1:5)
+  bad(agent_ars, env, data.frame(noise = 1), iterations = 1)
+  bad(search_ars, env, data.frame(noise = 1), 1:5, iterations = 1)
+  expect_error(sweep_agent(agent_ars, env, data.frame(stepsize = 1), 1:5, iterations = 1),
+               "no argument `stepsize`.*Did you mean `step_size`", class = "gym_error_argument")
+})
+
+test_that("no setting is the best where no run reached the target", {
+  env <- fake_environment(reward = function(seed, step, action) -1)
+  sweep <- sweep_agent(
+    agent_hill_climb, env, data.frame(noise = c(0.1, 1)), seeds = 1:5, report_seeds = 6:10,
+    iterations = 1, eval_episodes = 2, target = 100
+  )
+  expect_null(sweep$best)
+  expect_null(sweep$reported)
+  expect_output(print(sweep), "Best: none, no run reached the target", fixed = TRUE)
+})
+
+test_that("the curves of a sweep are those of its settings", {
+  curves <- learning_curves(sweep_fake())
+  expect_setequal(curves$training, c("noise = 0.1, candidates = 2", "noise = 1, candidates = 2"))
 })
 
 test_that("the runs of a sweep go to the workers of the plan", {
