@@ -247,7 +247,8 @@ print_env <- function(env, how, observations, actions) {
   sub_envs <- if (!is.null(env$num_envs)) {
     paste0(", ", count_of(env$num_envs, "sub-environment"), " (", how, ")")
   }
-  cat("<gym_env: ", wrapped_id(env$spec$id, env$spec$wrappers), sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
+  id <- wrapped_id(env$spec$id, env$spec$wrappers)
+  cat("<gym_env: ", id, sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
   cat("  observations: ", format(observations), "\n", sep = "")
   cat("  actions:      ", format(actions), "\n", sep = "")
   invisible(env)

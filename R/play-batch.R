@@ -248,7 +248,8 @@ begin_episodes <- function(batch, episode, last) {
 ask_beforehand <- function(batch, episode, observation, begun = seq_along(episode)) {
   policy <- batch$policy
   vector_env <- batch$vector_env
-  if (vector_env$num_envs == 1L || !(calls_function(policy) || inherits(policy, "gym_policy_list"))) {
+  asks <- calls_function(policy) || inherits(policy, "gym_policy_list")
+  if (vector_env$num_envs == 1L || !asks) {
     return(invisible())
   }
   for (row in begun[batch$episode[episode[begun]] == 1L]) {

@@ -319,11 +319,11 @@ returns_text <- function(returns) {
 #' @param object The result of [rollout()].
 #' @param ... Not used.
 #' @return An object of class `summary.gym_rollout`, a list with the elements `env_id` (a string),
-#'   `wrappers` (their names), `policy`, `episodes` and `steps` (their numbers, integers), `returns` and `lengths` (the
-#'   quartiles and the mean, named numeric vectors of length 6), `mean` and `se` (the mean return
-#'   and its standard error, doubles; `se` is `NA` for a single episode), `terminated` and
-#'   `truncated` (the numbers of episodes, integers), `candidates` (`NULL`, or for several policies
-#'   a row for each, as in [evaluate_policy()]).
+#'   `wrappers` (their names), `policy`, `episodes` and `steps` (their numbers, integers), `returns`
+#'   and `lengths` (the quartiles and the mean, named numeric vectors of length 6), `mean` and `se`
+#'   (the mean return and its standard error, doubles; `se` is `NA` for a single episode),
+#'   `terminated` and `truncated` (the numbers of episodes, integers), `candidates` (`NULL`, or for
+#'   several policies a row for each, as in [evaluate_policy()]).
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))

@@ -50,8 +50,8 @@ functions_of_environment <- function(x, seen) {
   }
   seen$list <- c(seen$list, x)
   # A class of R6 names the one that it inherits from in an expression.
-  parent <- if (inherits(x, "R6ClassGenerator")) as.function(list(x$inherit))
-  session_functions(c(list(parent, parent.env(x)), as.list(x, all.names = TRUE)), seen)
+  parent <- if (inherits(x, "R6ClassGenerator")) as.function(list(x$inherit), x$parent_env)
+  session_functions(c(list(parent, parent.env(x)), as.list.environment(x, all.names = TRUE)), seen)
 }
 
 # On the worker: where its functions look for them.

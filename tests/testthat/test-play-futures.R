@@ -272,10 +272,30 @@ test_that("functions travel with what they use of the session", {
     gym_test_policy <- function(observation) 2 * gym_test_list$above(observation[, 1])
     gym_test_shift <- 5
     gym_test_reward <- function(reward) reward + gym_test_shift
+    gym_test_walk <- R6::R6Class(
+      inherit = gym::GymEnv,
+      public = list(
+        at = 0,
+        reset = function() self$at <- 0,
+        step = function(action) {
+          self$at <- self$at + 1
+          list(observation = self$at, reward = gym_test_shift, terminated = self$at == 3)
+        }
+      )
+    )
+    gym_test_class <- R6::R6Class(
+      "Walk", inherit = gym_test_walk,
+      public = list(
+        observation_space = gym::space_discrete(4), action_space = gym::space_discrete(2)
+      )
+    )
   })
   eval(define, globalenv())
   withr::defer(rm(list = c("gym_test_limit", "gym_test_list", "gym_test_policy", "gym_test_shift",
-                           "gym_test_reward"), envir = globalenv()))
+                           "gym_test_reward", "gym_test_walk", "gym_test_class"),
+                  envir = globalenv()))
+  gym_register("Session-v0", get("gym_test_class", globalenv()))
+  withr::defer(gym_unregister("Session-v0"))
   play <- function() {
     policy <- get("gym_test_policy", globalenv())
     shaped <- gym_wrap("Acrobot-v1", "TransformReward", func = get("gym_test_reward", globalenv()))
@@ -283,6 +303,7 @@ test_that("functions travel with what they use of the session", {
       list(action = policy(observation), memory = memory)
     }, 0)
     suppressMessages(list(
+      rollout("Session-v0", policy_random(), 4, seed = 1)$episodes,
       rollout(shaped, policy, 4, seed = 1, max_steps = 20)$episodes,
       rollout("Acrobot-v1", remembers, 4, seed = 1, max_steps = 20)$episodes,
       coef(train_agent(agent_ars(directions = 2, top = 2), shaped, iterations = 1, seeds = 1:2,

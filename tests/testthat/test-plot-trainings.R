@@ -60,7 +60,8 @@ test_that("trainings that are given together are compared, by their names", {
   # Different targets are no line, and the caption says so.
   other <- training_of(c(10, 30), 1:2, target = 9)
   expect_identical(key_of(autoplot(ars, other)), c("ars", "other"))
-  expect_match(autoplot(ars, other)$labels$caption, "targets differ: ars: 5; other: 9", fixed = TRUE)
+  caption <- autoplot(ars, other)$labels$caption
+  expect_match(caption, "targets differ: ars: 5; other: 9", fixed = TRUE)
   expect_error(plot(ars, 3), class = "gym_error_argument")
   expect_error(autoplot(ars, col = 3), "no argument for `col`", class = "gym_error_argument")
 })

@@ -117,7 +117,8 @@ test_that("an action that a policy returns and that is none is the policy's, not
 
 test_that("a missing argument is named", {
   expect_error(rollout(corridor), "`policy` is missing", class = "gym_error_argument")
-  cnd <- expect_error(evaluate_policy(corridor), "`policy` is missing", class = "gym_error_argument")
+  cnd <- expect_error(evaluate_policy(corridor), "`policy` is missing",
+                      class = "gym_error_argument")
   expect_identical(cnd$call[[1L]], quote(evaluate_policy))
   expect_error(local_env("CartPole-v1")$step(), "`action` is missing", class = "gym_error_argument")
 })

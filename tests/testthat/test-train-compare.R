@@ -10,7 +10,8 @@ trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, solv
           mean_return = c(0, curve %||% score, score), se = 0, lower = 0, upper = 0, episodes = 9L
         ),
         agent = agent_ars(), target = target, env_id = env_id, seed = seed, steps = steps,
-        solved = solved, final = data.frame(mean_return = score), interrupted = FALSE, rules = list(total_steps = total_steps)
+        solved = solved, final = data.frame(mean_return = score), interrupted = FALSE,
+        rules = list(total_steps = total_steps)
       ),
       class = "gym_training"
     )
