@@ -12,7 +12,7 @@ sent_space <- function(space, num_envs) {
 # Whether values are sent as tensors. Those of a vector environment are if possible, but a
 # safetensors file needs at least one number.
 travels_as_tensors <- function(space, num_envs) {
-  has_tensors(space) && count_numbers(space) >= (if (is.null(num_envs)) tensors_pay_from else 1)
+  isTRUE(count_numbers(space) >= if (is.null(num_envs)) tensors_pay_from else 1)
 }
 
 # Steps ---------------------------------------------------------------------------------

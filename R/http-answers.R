@@ -101,14 +101,16 @@ new_tensors_reader <- function(read_answer, labels) {
   layout <- NULL
   function(response, key) {
     content <- response$content
-    if (response$status_code != 200L || !is_tensors_type(response$type)) {
-      return(read_json(response, key))
-    }
-    known <- !is.null(layout) && length(content) == layout$total &&
+    known <- !is.null(layout) && response$status_code == 200L &&
+      identical(response$type, layout$type) && length(content) == layout$total &&
       identical(content[layout$first], layout$start)
     if (!known) {
+      if (response$status_code != 200L || !is_tensors_type(response$type)) {
+        return(read_json(response, key))
+      }
       fresh <- read_layout(content, response$type == column_tensors_type)
       fresh <- prepare_layout(fresh, labels, key)
+      fresh$type <- response$type
       result <- read_answer(tensors_answer(content, fresh))
       if (length(fresh$start) <= small_answer) layout <<- fresh
       return(result)

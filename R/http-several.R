@@ -45,7 +45,7 @@ perform_several <- function(request, next_content, received, at_once = 2L,
 
 # Passes on the responses that have arrived. Returns whether to end.
 hand_over <- function(several, received) {
-  for (one in Filter(has_outcome, several$under_way)) {
+  for (one in Filter(function(one) !is.null(one$outcome), several$under_way)) {
     response <- take_response(one, several)
     if (!is.null(response)) {
       several$under_way <- Filter(function(other) !identical(other, one), several$under_way)
@@ -56,8 +56,6 @@ hand_over <- function(several, received) {
   }
   FALSE
 }
-
-has_outcome <- function(one) !is.null(one$outcome)
 
 send_one <- function(one, several) {
   request <- several$request
@@ -111,8 +109,8 @@ await_outcomes <- function(several) {
   if (state$too_large) {
     abort_too_large(base = several$client$remote_base, call = several$call)
   }
-  if (any(vapply(several$under_way, has_outcome, NA))) {
-    return(invisible())
+  for (one in several$under_way) {
+    if (!is.null(one$outcome)) return(invisible())
   }
   files <- curl::multi_fdset(pool)
   if (length(files$reads) || length(files$writes)) {

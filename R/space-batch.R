@@ -104,11 +104,12 @@ small_integers <- function(x) {
 #' @exportS3Method
 to_tensors.gym_space_discretes <- function(space, value, name, call, path = "") {
   unsigned <- space$dtype == "uint64"
-  if (unsigned || is_integer64(value) || !within_integer(value)) {
+  whole <- if (!unsigned) small_integers(value)
+  if (is.null(whole)) {
     space$dtype <- if (unsigned) "uint64" else "int64"
     return(to_tensors.default(space, value, name, call, path))
   }
-  bytes <- writeBin(as.integer(value), raw(), endian = "little")
+  bytes <- writeBin(whole, raw(), endian = "little")
   stats::setNames(list(list(dtype = "I32", shape = space$shape, bytes = bytes)), name)
 }
 

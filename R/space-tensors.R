@@ -17,33 +17,20 @@
 tensors_pay_from <- 200
 
 # Whether tensors can hold the values: all values of the space must have the same shape.
-has_tensors <- function(space) UseMethod("has_tensors")
+has_tensors <- function(space) !is.na(count_numbers(space))
 
-#' @exportS3Method
-has_tensors.default <- function(space) FALSE
-
-#' @exportS3Method
-has_tensors.gym_space_array <- function(space) TRUE
-
-#' @exportS3Method
-has_tensors.gym_space_discrete <- function(space) TRUE
-
-#' @exportS3Method
-has_tensors.gym_space_text <- function(space) TRUE
-
-#' @exportS3Method
-has_tensors.gym_space_tuple <- function(space) all(vapply(space$spaces, has_tensors, NA))
-
-#' @exportS3Method
-has_tensors.gym_space_dict <- has_tensors.gym_space_tuple
-
+# How many numbers the tensors of a value have, `NA` if they cannot hold it.
 count_numbers <- function(space) {
   if (inherits(space, "gym_space_array")) {
     prod(space$shape)
-  } else if (is.list(space$spaces)) {
+  } else if (inherits(space, "gym_space_discrete")) {
+    1
+  } else if (inherits(space, "gym_space_text")) {
+    0
+  } else if (has_parts(space)) {
     sum(vapply(space$spaces, count_numbers, 0))
   } else {
-    as.numeric(inherits(space, "gym_space_discrete"))
+    NA_real_
   }
 }
 
