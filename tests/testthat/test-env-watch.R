@@ -74,6 +74,15 @@ test_that("an environment with render_mode \"human\" opens its page when it is m
   expect_length(seen$addresses, 2)
 })
 
+test_that("a viewer that fails leaves no environment behind", {
+  withr::local_options(gym.viewer = function(address) stop("there is no screen"))
+  client <- test_client()
+  before <- env_list(client)$instance_id
+  expect_error(gym_make("CartPole-v1", render_mode = "human", client = client), "no screen")
+  expect_error(env_create(client, "CartPole-v1", render_mode = "human"), "no screen")
+  expect_identical(env_list(client)$instance_id, before)
+})
+
 test_that("a script prints the address, once an environment", {
   withr::local_options(gym.viewer = NULL, rlang_interactive = FALSE)
   expect_message(env <- local_env(render_mode = "human"), class = "gym_message_watch")
