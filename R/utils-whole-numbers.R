@@ -19,7 +19,8 @@ whole_from_digits <- function(digits) {
   if (any(lost)) {
     abort_whole(digits[lost][[1L]])
   }
-  integers_beyond_double(digits)
+  check_bit64(digits[which.max(nchar(digits))])
+  bit64::as.integer64(digits)
 }
 
 narrow_whole <- function(numbers) {
@@ -30,23 +31,18 @@ within_integer <- function(x) {
   isTRUE(length(x) == 0L || min(x) >= -.Machine$integer.max && max(x) <= .Machine$integer.max)
 }
 
-integers_beyond_double <- function(digits,
-                                   has_bit64 = requireNamespace("bit64", quietly = TRUE)) {
+# `largest` is the largest of the numbers, as text.
+check_bit64 <- function(largest, has_bit64 = requireNamespace("bit64", quietly = TRUE)) {
   if (!has_bit64) {
-    abort_without_bit64(digits[which.max(nchar(digits))])
+    gym_abort(
+      c(
+        paste0("The integer ", largest, " is beyond 2^53, where R's numbers have gaps."),
+        i = "With the package bit64 installed it arrives exactly: install.packages(\"bit64\")."
+      ),
+      class = "gym_error_space",
+      call = NULL
+    )
   }
-  bit64::as.integer64(digits)
-}
-
-abort_without_bit64 <- function(digits) {
-  gym_abort(
-    c(
-      paste0("The integer ", digits, " is beyond 2^53, where R's numbers have gaps."),
-      i = "With the package bit64 installed it arrives exactly: install.packages(\"bit64\")."
-    ),
-    class = "gym_error_space",
-    call = NULL
-  )
 }
 
 abort_whole <- function(digits) {
@@ -110,9 +106,7 @@ narrow_integer64 <- function(x) {
   if (all(abs(numbers) < 2^53, na.rm = TRUE)) {
     return(numbers)
   }
-  if (!requireNamespace("bit64", quietly = TRUE)) {
-    abort_without_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
-  }
+  check_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
   x
 }
 
@@ -160,9 +154,7 @@ whole_from_halves <- function(bytes, n, signed) {
   if (all(abs(numbers) < 2^53 | abs(numbers) == 2^53 & unsigned_half(lower) == 0)) {
     return(numbers)
   }
-  if (!requireNamespace("bit64", quietly = TRUE)) {
-    abort_without_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
-  }
+  check_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
   lost <- if (signed) is.na(upper) & lower %in% 0L else is.na(upper) | upper < 0L
   if (any(lost)) {
     number <- numbers[lost][[1L]]

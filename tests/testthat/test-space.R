@@ -97,8 +97,7 @@ test_that("integers beyond 2^53 are integer64, never rounded", {
 
 test_that("without bit64 an integer beyond 2^53 is an error that names bit64", {
   error <- expect_error(
-    integers_beyond_double(c("-5", "9007199254740993"), has_bit64 = FALSE),
-    class = "gym_error_space"
+    check_bit64("9007199254740993", has_bit64 = FALSE), class = "gym_error_space"
   )
   expect_match(conditionMessage(error), "9007199254740993.*bit64")
 })
