@@ -19,7 +19,7 @@ _MOST_TAKEN = 2000
 
 
 @dataclass(eq=False)
-class Request:
+class RolloutRequest:
     """Units that a client waits for.
 
     Attributes:

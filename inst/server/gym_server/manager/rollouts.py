@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gym_server.errors import GymServerError, call_too_long, environment_error, shutting_down
-from gym_server.manager.rollout_request import Request
+from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
 from gym_server.protocol import safetensors
@@ -75,7 +75,7 @@ class _Player:
 
     key: str | None
     process: WorkerProcess | None = None
-    request: Request | None = None
+    request: RolloutRequest | None = None
     units: range = range(0)
     steps: int = -1
     steps_since: float = 0.0
@@ -97,7 +97,7 @@ class Rollouts:
         """
         self.most_processes = most_processes
         self._changed = threading.Condition()
-        self._requests: deque[Request] = deque()
+        self._requests: deque[RolloutRequest] = deque()
         self._players: list[_Player] = []
         # The environment that was played last, and the duration of one of its units.
         self._last_played: tuple[str, float] | None = None
@@ -147,9 +147,11 @@ class Rollouts:
                 raise error
         return concatenated(results), error
 
-    def _request(self, task: Task, function: str, trusted: bool, units: Sequence[Unit]) -> Request:
+    def _request(
+        self, task: Task, function: str, trusted: bool, units: Sequence[Unit]
+    ) -> RolloutRequest:
         key = None if trusted else task.env_key
-        request = Request(next(_numbers), task, function, key, units)
+        request = RolloutRequest(next(_numbers), task, function, key, units)
         request.waiting.append(range(len(units)))
         with self._changed:
             if self._last_played is not None and self._last_played[0] == task.env_key:
@@ -174,7 +176,7 @@ class Rollouts:
             self._changed.notify_all()
         return request
 
-    def _wait(self, request: Request, is_wanted: Callable[[], bool]) -> None:
+    def _wait(self, request: RolloutRequest, is_wanted: Callable[[], bool]) -> None:
         while not request.over.wait(_LOOK_SECONDS):
             if not is_wanted():
                 with self._changed:
@@ -182,7 +184,7 @@ class Rollouts:
                     self._end_if_over(request)
                 raise GymServerError("call_too_long", "The client stopped waiting")
 
-    def _end_if_over(self, request: Request) -> None:
+    def _end_if_over(self, request: RolloutRequest) -> None:
         if request.is_over:
             request.over.set()
             if request in self._requests:
@@ -249,7 +251,7 @@ class Rollouts:
                 self._changed.wait(left)
         return False
 
-    def _end_turn(self, request: Request) -> None:
+    def _end_turn(self, request: RolloutRequest) -> None:
         """Move a request to the end of the queue when its turn is over."""
         now = time.monotonic()
         if request.turn_ends is None:
@@ -259,7 +261,7 @@ class Rollouts:
             self._requests.remove(request)
             self._requests.append(request)
 
-    def _needs_room(self, request: Request) -> bool:
+    def _needs_room(self, request: RolloutRequest) -> bool:
         """Whether a request needs a process of its own, and there may be no more."""
         return (
             len(self._players) >= self.most_processes
@@ -297,7 +299,7 @@ class Rollouts:
             self._changed.notify_all()
 
     def _call(
-        self, player: _Player, request: Request, units: range
+        self, player: _Player, request: RolloutRequest, units: range
     ) -> tuple[int, Any, GymServerError | None]:
         """Return how many units were played, their results, and the error that ended them."""
         process = player.process
@@ -319,7 +321,7 @@ class Rollouts:
         return _read(body)
 
     def _enter_error(
-        self, player: _Player, request: Request, units: range, error: GymServerError
+        self, player: _Player, request: RolloutRequest, units: range, error: GymServerError
     ) -> None:
         process = player.process
         if process is None or process.is_alive:
