@@ -1,44 +1,41 @@
 import http.server
 import socket
-import subprocess
-import sys
 import threading
 from contextlib import contextmanager
 
 import pytest
-from conftest import SERVER, TOKEN
+from conftest import TOKEN
 
+from gym_server.cli import main
 from gym_server.cli import port_holder as module
 from gym_server.cli.port_holder import port_holder
 
 pytestmark = pytest.mark.slow
 
 
-def refused(port):
+@pytest.fixture
+def refused(capsys):
     """Start a server on a taken port; return the line that it prints."""
-    second = subprocess.run(
-        [sys.executable, "-m", "gym_server", "--port", str(port)],
-        cwd=SERVER,
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    assert (second.returncode, second.stdout) == (1, "")
-    assert second.stderr.count("\n") == 1
-    assert f"port {port} on 127.0.0.1 cannot be used: " in second.stderr
-    assert "--port 0" in second.stderr
-    return second.stderr
+
+    def refused(port):
+        assert main.main(["--port", str(port)]) == 1
+        output, errors = capsys.readouterr()
+        assert (output, errors.count("\n")) == ("", 1)
+        assert f"port {port} on 127.0.0.1 cannot be used: " in errors
+        assert "--port 0" in errors
+        return errors
+
+    return refused
 
 
-def test_another_gym_server_is_named_with_its_process(serve):
+def test_another_gym_server_is_named_with_its_process(serve, refused):
     server = serve()
     said = refused(server.port)
     assert f"a Gym server 1.0.0 (process {server.process.pid}) has it" in said
     assert server.stop()[0] == 0
 
 
-def test_one_that_asks_for_a_token_is_shown_none(serve, monkeypatch):
+def test_one_that_asks_for_a_token_is_shown_none(serve, refused, monkeypatch):
     server = serve("--log-level", "info", GYM_SERVER_TOKEN=TOKEN)
     monkeypatch.setenv("GYM_SERVER_TOKEN", TOKEN)
     assert "a Gym server that asks for a token has it" in refused(server.port)
@@ -63,7 +60,7 @@ def listening(serve):
         yield listener.getsockname()[1]
 
 
-def test_another_program_is_called_so():
+def test_another_program_is_called_so(refused):
     with http.server.HTTPServer(("127.0.0.1", 0), Stranger) as stranger:
         threading.Thread(target=stranger.serve_forever, daemon=True).start()
         assert "another program has it" in refused(stranger.server_port)
