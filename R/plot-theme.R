@@ -166,7 +166,7 @@ few_breaks <- function(limits, n = 5) {
     return(from:to)
   }
   at <- pretty(limits, n)
-  if (sum(at >= limits[[1L]] & at <= limits[[2L]]) > n + 1) pretty(limits, n - 1) else at
+  if (sum(at >= limits[[1L]] & at <= limits[[2L]]) > n) pretty(limits, n - 1) else at
 }
 
 # Rounds are whole numbers from 1, and so are their axis marks.
