@@ -70,11 +70,8 @@ agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tempera
   check_flag(double)
   check_count(planning, min = 0)
   check_number(bonus, min = 0)
-  settings <- list(
-    discount = discount, learning_rate = learning_rate, epsilon = epsilon,
-    temperature = temperature, initial = initial, features = features, double = double,
-    planning = as.integer(planning), bonus = bonus, mask = mask
-  )
+  settings <- mget(names(formals()))
+  settings$planning <- as.integer(planning)
   check_learner(settings)
   if (bonus > 0 && planning == 0) {
     gym_abort(

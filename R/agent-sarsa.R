@@ -33,11 +33,8 @@ agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tem
   check_flag(expected)
   check_count(n)
   check_number(lambda, min = 0, max = 1)
-  settings <- list(
-    discount = discount, learning_rate = learning_rate, epsilon = epsilon,
-    temperature = temperature, initial = initial, features = features, expected = expected,
-    n = as.integer(n), lambda = lambda, mask = mask
-  )
+  settings <- mget(names(formals()))
+  settings$n <- as.integer(n)
   check_learner(settings)
   check_one_horizon(n, lambda)
   new_learner("gym_agent_sarsa", settings)

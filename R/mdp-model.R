@@ -123,13 +123,7 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
     abort_argument(x, "a data frame with a row for each transition", arg, call)
   }
   needed <- c("state", "action", "next_state", "reward")
-  absent <- setdiff(needed, names(x))
-  if (length(absent)) {
-    gym_abort(
-      paste0("`", arg, "` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
-  }
+  check_columns(x, needed, arg, call)
   for (name in intersect(c(needed, "probability"), names(x))) {
     x[[name]] <- plain_numbers(x[[name]], paste0(arg, "$", name), call)
   }

@@ -162,13 +162,7 @@ path_points <- function(path, names, call = rlang::caller_env()) {
   if (!is.data.frame(path) || !nrow(path)) {
     abort_argument(path, "a rollout with steps, a data frame of steps, TRUE or NULL", "path", call)
   }
-  absent <- setdiff(names, names(path))
-  if (length(absent)) {
-    gym_abort(
-      paste0("`path` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
-      class = "gym_error_argument", argument = "path", value = path, call = call
-    )
-  }
+  check_columns(path, names, "path", call)
   # Each candidate's episodes are numbered from 1.
   episode <- paste(path$candidate %||% 1L, path$episode %||% 1L)
   data.frame(

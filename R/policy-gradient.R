@@ -162,13 +162,7 @@ counted_actions <- function(policy, action, n, call = rlang::caller_env()) {
     # The numbers of an action with several dimensions are taken row by row.
     return(matrix(row_major(action), outputs))
   }
-  start <- policy$action_space$start %||% 0L
-  at <- as.vector(action) - start + 1
-  if (any(at < 1 | at > outputs | at != trunc(at))) {
-    must <- paste("whole numbers from", start, "to", start + outputs - 1L)
-    abort_argument(action, must, "action", call)
-  }
-  as.integer(at)
+  counted_from_one(action, policy$action_space$start %||% 0L, outputs, "action", call)
 }
 
 # Converts actions from 1 to places in a matrix with so many outputs in each column.

@@ -294,14 +294,20 @@ network_inputs <- function(policy, values, call = rlang::caller_env()) {
     }
     return(normalized(values, policy$moments))
   }
-  at <- if (is.numeric(values)) values[, 1L] - space$start + 1 else NA
-  if (anyNA(at) || any(at < 1 | at > space$n | at != trunc(at))) {
-    must <- paste("whole numbers from", space$start, "to", space$start + space$n - 1L)
-    abort_argument(as.vector(values), must, "observation", call)
-  }
+  at <- counted_from_one(as.vector(values), space$start, space$n, "observation", call)
   inputs <- matrix(0, nrow = nrow(values), ncol = space$n)
   inputs[cbind(seq_len(nrow(values)), at)] <- 1
   inputs
+}
+
+# The numbers of `n` values, from 1 instead of `start`.
+counted_from_one <- function(values, start, n, arg, call) {
+  at <- if (is.numeric(values)) values - start + 1 else NA
+  if (anyNA(at) || any(at < 1 | at > n | at != trunc(at))) {
+    must <- paste("whole numbers from", start, "to", start + n - 1L)
+    abort_argument(values, must, arg, call)
+  }
+  as.integer(at)
 }
 
 # Drawing again, and printing ------------------------------------------------------

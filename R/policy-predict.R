@@ -78,13 +78,7 @@ observations_from <- function(newdata, policy, call) {
   discrete <- inherits(policy$observation_space, "gym_space_discrete")
   names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
   if (any(names %in% names(newdata))) {
-    absent <- setdiff(names, names(newdata))
-    if (length(absent)) {
-      gym_abort(
-        paste0("`newdata` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
-        class = "gym_error_argument", argument = "newdata", value = newdata, call = call
-      )
-    }
+    check_columns(newdata, names, "newdata", call)
     newdata <- newdata[names]
   }
   if (discrete) newdata[[1L]] else unname(as.matrix(newdata))

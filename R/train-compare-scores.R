@@ -5,7 +5,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
   interrupted <- unlist(lapply(trainings, function(x) {
     vapply(each_training(x), function(one) isTRUE(one$interrupted), NA)
   }))
-  found <- run_scores(trainings, curves, settings$steps, call)
+  found <- run_scores(trainings, curves, settings$total_steps, call)
   runs <- found$runs
   ids <- unique(runs$env_id)
   check_same_environments(runs, call)
@@ -24,7 +24,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
       found$note,
       if (any(interrupted)) paste(count_of(sum(interrupted), "interrupted run"), "left out")
     ),
-    steps = found$steps, by_end = found$by_end
+    total_steps = found$steps, by_end = found$by_end
   )
 }
 
@@ -62,7 +62,7 @@ run_scores <- function(trainings, curves, steps, call) {
     gym_abort(
       c(paste0("Not all runs have taken ", whole_number_text(at), " steps."),
         i = paste0("The shortest ended after ", whole_number_text(min(ends)), ".")),
-      class = "gym_error_argument", argument = "steps", value = at, call = call
+      class = "gym_error_argument", argument = "total_steps", value = at, call = call
     )
   }
   score <- vapply(of_run, function(run) {

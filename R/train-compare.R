@@ -7,7 +7,7 @@
 #'
 #' Trainings without a target (`target = Inf`) are compared by their scores, the mean returns of the
 #' final evaluations. A training ends with the iteration that uses up its budget, so `print()` shows
-#' the steps that were taken; `steps` compares the learning curves at one number of steps instead.
+#' the steps that were taken; `total_steps` compares the learning curves at one number of steps.
 #' If budgets differ, that is the smallest number that all have taken, and `print()` says so. The
 #' statistics are those of Agarwal et al. (2021):
 #'
@@ -36,8 +36,8 @@
 #' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
 #'   one agent in several environments have the same name. Or one data frame as returned by
 #'   [learning_curves()], including logs of other programs, compared by scores.
-#' @param steps The number of steps at which scores are compared. `NULL`, the default, is the common
-#'   budget.
+#' @param total_steps The number of steps of the training after which scores are compared. `NULL`,
+#'   the default, is the common budget.
 #' @param reference `NULL`, the default, or a data frame with the columns `env_id`, `low` and
 #'   `high`, which also normalises scores in one environment.
 #' @param reps The number of bootstrap samples, a whole number of at least 1.
@@ -62,7 +62,7 @@
 #'       `training`, `score` (or `env_id` and `steps`), `share`, `lower`, `upper`.}
 #'     \item{reference}{The data frame that normalised the scores, or `NULL`.}
 #'     \item{notes}{Differences that make the comparison unfair, strings.}
-#'     \item{steps, level, reps, seed}{As given, found or drawn.}
+#'     \item{total_steps, level, reps, seed}{As given, found or drawn.}
 #'   }
 #' @section Errors: `gym_error_argument` for trainings that cannot be compared. With fewer than five
 #'   seeds a warning, `gym_warning_seeds`, says that intervals mean little.
@@ -83,10 +83,11 @@
 #' compared <- compare_trainings(ARS = ars, `hill climbing` = hill, seed = 1)
 #' compared
 #' plot(compared)
-compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, level = 0.95,
+compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 2000, level = 0.95,
                               seed = NULL) {
   call <- rlang::current_env()
-  check_number(steps, min = 0, allow_null = TRUE)
+  check_no_steps(...names(), call)
+  check_number(total_steps, min = 0, allow_null = TRUE)
   check_reference(reference, call)
   check_count(reps)
   check_seed(seed)
@@ -106,16 +107,16 @@ compare_trainings <- function(..., steps = NULL, reference = NULL, reps = 2000, 
   }
   check_different_runs(trainings, call)
   settings <- list(
-    steps = steps, level = level, reps = as.integer(reps), seed = seed %||% draw_seed()
+    total_steps = total_steps, level = level, reps = as.integer(reps), seed = seed %||% draw_seed()
   )
   compared <- if (stop_at_target(trainings, call)) {
     compare_by_steps(trainings, level)
   } else {
     compare_by_scores(trainings, curves %||% curves_of(trainings), settings, reference, call)
   }
-  settings["steps"] <- compared["steps"]
+  settings["total_steps"] <- compared["total_steps"]
   compared$notes <- c(compared$notes, unequal_rules(trainings))
-  compared$steps <- NULL
+  compared$total_steps <- NULL
   few <- min(runs_each(compared$runs))
   if (few < 5L) warn_few_seeds(few)
   structure(c(compared, settings), class = "gym_comparison")
@@ -273,7 +274,7 @@ comparison_lines <- function(x, pairs = TRUE) {
     paste0(
       if (scores) "Scores" else "Steps to the target", if (!anyNA(where)) paste0(" in ", where),
       if (scores) paste(if (x$by_end) " at a budget of" else " after",
-                        count_of(round(x$steps), "step")),
+                        count_of(round(x$total_steps), "step")),
       ", ", paste(seeds, collapse = " to "), " seed", if (max(seeds) > 1L) "s", " each"
     ),
     if (scores && x$by_end) steps_taken_line(x$runs),

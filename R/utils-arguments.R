@@ -153,6 +153,16 @@ check_suggested <- function(package, purpose, call = rlang::caller_env()) {
   }
 }
 
+check_columns <- function(x, needed, arg, call) {
+  absent <- setdiff(needed, names(x))
+  if (length(absent)) {
+    gym_abort(
+      paste0("`", arg, "` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+}
+
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
     c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),

@@ -40,7 +40,7 @@ draw("trainings-compared", random = agents$random,
 
 draw("compared-steps", compare_trainings(CEM = agents$cem, ARS = agents$ars, PPO = agents$ppo))
 curves <- learning_curves(CEM = agents$cem, ARS = agents$ars, PPO = agents$ppo)
-scores <- compare_trainings(curves, steps = 3000, seed = 1)
+scores <- compare_trainings(curves, total_steps = 3000, seed = 1)
 draw("compared-scores", scores)
 draw("compared-profile", scores, type = "profile")
 draw("compared-improvement", scores, type = "improvement")

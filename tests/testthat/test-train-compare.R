@@ -76,7 +76,7 @@ test_that("a comparison has a table and prints, and a seed fixes it", {
   expect_identical(as.data.frame(compared)$statistic, rep(c("mean", "iqm"), 2))
   expect_identical(as.data.frame(compared)$value[1:2], c(16.4, 14))
   expect_identical(compared$improvement$probability, 1)
-  expect_identical(compared$steps, 100)
+  expect_identical(compared$total_steps, 100)
   expect_identical(compare_trainings(a, b, seed = 7)$table, compared$table)
   set.seed(3)
   state <- .Random.seed
@@ -98,12 +98,14 @@ test_that("with other budgets scores are those of the curves at the common numbe
   short <- trainings_with(rep(10, 5))
   long <- trainings_with(rep(20, 5), steps = 400, total_steps = 400, curve = 4)
   compared <- compare_trainings(short, long, seed = 1)
-  expect_identical(compared$steps, 100)
+  expect_identical(compared$total_steps, 100)
   # From 0 to 4 in 200 steps.
   expect_identical(unique(compared$runs$score[compared$runs$training == "long"]), 2)
   expect_match(compared$notes, "learning curves after 100 steps", all = FALSE)
   expect_match(compared$notes, "budgets differ", all = FALSE)
-  expect_error(compare_trainings(short, long, steps = 101), "100", class = "gym_error_argument")
+  expect_error(
+    compare_trainings(short, long, total_steps = 101), "100", class = "gym_error_argument"
+  )
   # A budget that was used up by more or less: the final evaluations count.
   a <- trainings_with(1:5, steps = c(100, 120, 110, 100, 105), curve = 99)
   ended <- compare_trainings(a, seed = 1)
@@ -205,10 +207,11 @@ test_that("what is no training is named, with what it was meant to be", {
   refused <- function(code, text) {
     expect_error(code, text, fixed = TRUE, class = "gym_error_argument")
   }
-  refused(compare_trainings(x = some, step = 3), "Did you mean `steps`?")
+  refused(compare_trainings(x = some, totalsteps = 3), "Did you mean `total_steps`?")
+  refused(compare_trainings(x = some, steps = 3), "is the argument `total_steps`, not `steps`")
   refused(compare_trainings(x = some, y = 3), "`y` must be a training, not 3.")
   refused(compare_trainings(list(some, some)), "do.call(compare_trainings, x)")
-  refused(compare_trainings(x = some, steps = 1e6), "have taken 1,000,000 steps")
+  refused(compare_trainings(x = some, total_steps = 1e6), "have taken 1,000,000 steps")
 })
 
 test_that("many pairs are not printed", {
