@@ -17,10 +17,7 @@ new_frames <- function(files, fps = NULL) {
 `[[.gym_frames` <- function(x, i) frame_from_png(unclass(x)[[i]])
 
 #' @export
-print.gym_frames <- function(x, ...) {
-  cat(format(x), "\n", sep = "")
-  invisible(x)
-}
+print.gym_frames <- function(x, ...) print_line(x)
 
 #' @export
 format.gym_frames <- function(x, ...) {

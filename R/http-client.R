@@ -14,10 +14,7 @@ new_client <- function(remote_base, timeout = 60, config = httr::config(), token
 }
 
 #' @export
-print.GymClient <- function(x, ...) {
-  cat(format(x), "\n", sep = "")
-  invisible(x)
-}
+print.GymClient <- function(x, ...) print_line(x)
 
 #' @export
 format.GymClient <- function(x, ...) paste0("<GymClient: ", x$remote_base, ">")

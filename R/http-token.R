@@ -15,10 +15,7 @@ new_token <- function(text) {
 }
 
 #' @export
-print.gym_token <- function(x, ...) {
-  cat(format(x), "\n", sep = "")
-  invisible(x)
-}
+print.gym_token <- function(x, ...) print_line(x)
 
 #' @export
 format.gym_token <- function(x, ...) "<token>"

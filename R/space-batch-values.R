@@ -171,23 +171,15 @@ number_rows <- function(batch) {
 as_batch <- function(space, actions) {
   if (has_parts(space)) {
     complete <- is.list(actions) && length(actions) == length(space$spaces)
-    if (complete) map_parts(space, as_batch, in_order(space, actions)) else actions
-  } else if (is_stackable(space) && prod(space$shape) == 1 && is_column(actions)) {
-    column_as_batch(space, actions)
-  } else {
-    actions
+    return(if (complete) map_parts(space, as_batch, in_order(space, actions)) else actions)
   }
-}
-
-# For actions of one number each, a vector and a matrix of one column mean the same.
-is_column <- function(x) {
-  is.atomic(x) && length(x) > 0L && length(x) == stack_length(x)
-}
-
-column_as_batch <- function(space, actions) {
-  if (is.logical(actions) && !identical(space$dtype, "bool")) {
-    actions <- as.integer(actions)
+  # For actions of one number each, a vector and a matrix of one column mean the same.
+  if (is_stackable(space) && prod(space$shape) == 1 && is.atomic(actions) &&
+        length(actions) > 0L && length(actions) == stack_length(actions)) {
+    if (is.logical(actions) && !identical(space$dtype, "bool")) {
+      actions <- as.integer(actions)
+    }
+    dim(actions) <- if (length(space$shape)) c(length(actions), space$shape)
   }
-  dim(actions) <- if (length(space$shape)) c(length(actions), space$shape)
   actions
 }

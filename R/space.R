@@ -41,10 +41,7 @@ format.gym_space <- function(x, ..., width = 100L) {
 }
 
 #' @export
-print.gym_space <- function(x, ...) {
-  cat(format(x), "\n", sep = "")
-  invisible(x)
-}
+print.gym_space <- function(x, ...) print_line(x)
 
 # Values --------------------------------------------------------------------------
 

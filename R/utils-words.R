@@ -56,3 +56,9 @@ did_you_mean <- function(name, choices, form = "`%s`") {
   near <- if (length(choices)) nearest_name(name, choices)
   if (length(near)) paste0("Did you mean ", sprintf(form, near), "?")
 }
+
+# Prints an object that format() describes in one line.
+print_line <- function(x) {
+  cat(format(x), "\n", sep = "")
+  invisible(x)
+}
