@@ -145,7 +145,8 @@ check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env
     gym_abort(
       c(paste0("`", given[[1L]], "` is for an environment given by its id, but this ",
                environment_label(env), " was made before."),
-        i = "Give its id instead, or pass the argument to `gym_make()`."),
+        i = did_you_mean(given[[1L]], c("seed", "episodes", "max_steps", "steps")) %||%
+          "Give its id instead, or pass the argument to `gym_make()`."),
       class = "gym_error_argument", argument = given[[1L]], call = call
     )
   }

@@ -21,7 +21,8 @@
 #'
 #' `func` gets batches, even for a single environment: rewards as a vector, observations in the form
 #' for policies (see [act()]). It returns as many values, which should depend on its arguments only.
-#' Its only argument may have any name.
+#' Its only argument may have any name. A file of [saveRDS()] does not contain the variables and
+#' functions of the session that it uses: define them again before you play on in another session.
 #'
 #' R plays a wrapped environment of Gymnasium step by step (see [rollout()]). This is slower than
 #' playing on the server, and learners of tables play instead of sampling from a model. The server's

@@ -125,7 +125,7 @@ autoplot.gym_policy <- function(object, ...) {
   gym_abort(
     c(paste0("Only a network can be drawn, not a policy that is ", format(object), "."),
       i = if (inherits(object, "gym_policy_table")) {
-        "`decision_map()` and `state_values()` show what a table has, and both can be plotted."
+        table_hint
       } else {
         "`policy_network()` makes one."
       }),

@@ -74,11 +74,17 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
   policy_candidates(object$policy, value)
 }
 
+# A table is a picture of states, and what it holds belongs to the agent that learned it.
+table_hint <- paste(
+  "`decision_map(env, policy)` shows what a table does, and `state_values(training)` the values",
+  "that were learned; both can be plotted."
+)
+
 abort_no_weights <- function(policy, arg, call) {
   gym_abort(
     c(paste0("`", arg, "` must be a policy with weights, not ", policy_text(policy), "."),
       i = if (inherits(policy, "gym_policy_table")) {
-        "`state_values()` and `decision_map()` show what a table has."
+        table_hint
       } else {
         "`policy_network()` makes one."
       }),

@@ -18,8 +18,9 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
   # Replace the target of a link, not the link.
   path <- normalizePath(absolute_path(path), mustWork = FALSE)
   if (dir.exists(path) || !dir.exists(dirname(path))) {
-    problem <- if (dir.exists(path)) "is a folder" else "is in a folder that does not exist"
-    abort_checkpoint(path, problem, call = call)
+    if (dir.exists(path)) abort_checkpoint(path, "is a folder", call = call)
+    folder <- paste0("`dir.create(\"", dirname(path), "\")` makes the folder.")
+    abort_checkpoint(path, "is in a folder that does not exist", hint = folder, call = call)
   }
   remove_parts(path)
   mark <- file_mark(path)
@@ -203,15 +204,17 @@ check_same_server <- function(path, there, now, call) {
   }
 }
 
-abort_checkpoint <- function(path, problem, lines = NULL, call, ...) {
+other_file_hint <- paste(
+  "Give another file as `checkpoint`, or start again with `resume = FALSE`, which",
+  "replaces the file."
+)
+
+abort_checkpoint <- function(path, problem, lines = NULL, call, ..., hint = other_file_hint) {
   gym_abort(
     c(
       paste0("The checkpoint \"", path, "\" ", problem, "."),
       if (length(lines)) stats::setNames(lines, rep("x", length(lines))),
-      i = paste(
-        "Give another file as `checkpoint`, or start again with `resume = FALSE`, which",
-        "replaces the file."
-      )
+      i = hint
     ),
     class = c("gym_error_checkpoint", "gym_error_argument"),
     path = path, ..., call = call

@@ -145,7 +145,7 @@ trainings_lines <- function(x) {
              number_text(min(returns)), " to ", number_text(max(returns)))
     },
     paste0(if (any(table$interrupted)) "Interrupted after " else "Played ",
-           count_of(nrow(table), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
+           count_of(nrow(done), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
            seconds_text(x$elapsed))
   )
 }

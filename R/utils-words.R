@@ -45,8 +45,12 @@ nearest_name <- function(name, choices) {
     vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
   }
   distance <- function(form) utils::adist(form(plain_name(name)), form(plain_name(choices)))[1L, ]
+  # `max_steps` is `max_episode_steps` with a word left out.
+  words <- function(x) strsplit(lower_case(x), "[._]")
+  wanted <- words(name)[[1L]]
+  within <- length(wanted) > 1L & vapply(words(choices), function(of) all(wanted %in% of), NA)
   begins <- nchar(name) > 3L & startsWith(plain_name(choices), plain_name(name))
-  close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins
+  close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins | within
   # Of equally similar names the one with the same letters is better.
   best <- order(distance(identity), distance(ordered))
   utils::head(choices[best[close[best]]], 1L)

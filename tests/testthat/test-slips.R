@@ -30,6 +30,7 @@ test_that("an argument of gym_make() that nearly is one is named", {
   expect_identical(meant(wrapper = list()), "wrappers")
   expect_identical(meant(autoreset = "NextStep"), "autoreset_mode")
   expect_identical(meant(max_episode_step = 3), "max_episode_steps")
+  expect_identical(meant(max_steps = 3), "max_episode_steps")
   expect_null(meant(gravity = 3))
 })
 
@@ -148,4 +149,20 @@ test_that("a table for observations that cannot be counted is refused by the cal
   cnd <- expect_error(learn_q("CartPole-v1", total_steps = 10, client = test_client()),
                       "cannot", class = "gym_error_argument")
   expect_identical(cnd$call[[1L]], quote(learn_q))
+})
+
+test_that("hints are calls that help", {
+  q <- learn_q(corridor, iterations = 1, seed = 1, target = Inf, eval_episodes = 2)
+  expect_error(coef(q$policy), "state_values(training)", fixed = TRUE, class = "gym_error_argument")
+  expect_error(plot(q$policy), "state_values(training)", fixed = TRUE, class = "gym_error_argument")
+  expect_length(state_values(q), 1)
+  folder <- file.path(withr::local_tempdir(), "runs")
+  train <- function(...) {
+    train_agent(agent_ars(), fake_environment(), iterations = 1, eval_episodes = 2, target = Inf,
+                checkpoint = file.path(folder, "a.rds"))
+  }
+  cnd <- expect_error(train(), "dir.create(", fixed = TRUE, class = "gym_error_checkpoint")
+  expect_no_match(conditionMessage(cnd), "resume")
+  expect_error(evaluate_policy(corridor, policy_random(), seeds = 1), "Did you mean `seed`?",
+               fixed = TRUE, class = "gym_error_argument")
 })

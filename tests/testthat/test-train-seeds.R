@@ -112,7 +112,7 @@ test_that("an interrupt and an error keep the trainings before them, and the one
   expect_identical(nrow(trained$trainings[[2]]$history), 2L)
   expect_identical(as.data.frame(trained)$interrupted, c(FALSE, TRUE))
   expect_identical(summary(trained)$finished, 1L)
-  expect_output(print(trained), "Interrupted after 2 seeds")
+  expect_output(print(trained), "Interrupted after 1 seed,")
   cnd <- expect_error(quiet_trainings(env = stopping(function() gym_abort("lost"))),
                       "after 1 seed", class = "gym_error_training")
   expect_identical(nrow(cnd$result$trainings[[2]]$history), 2L)
