@@ -22,7 +22,7 @@ help:
 	@echo '               QUICK=1 is shorter, PARTS="clients cuts" runs two parts'
 	@echo 'make check     R CMD build and R CMD check, in a temporary folder'
 	@echo 'make lint      lint R (lintr, layers), Python (ruff, import-linter, mypy) and spelling'
-	@echo 'make coverage  list the files that make test reaches least, of both halves; ten minutes'
+	@echo 'make coverage  list the files that every test together reaches least; an hour'
 	@echo 'make site      build the site (pkgdown) in site/ and check its links; ten minutes'
 	@echo 'make document  make man/ and NAMESPACE from the comments in R/ (roxygen2)'
 	@echo 'make clean     remove everything that these made'
