@@ -4,7 +4,12 @@
 autoplot.gym_sweep <- function(object, ...) {
   check_dots_empty(...)
   trained <- Filter(Negate(is.null), object$trainings)
-  trainings_picture(trained) +
+  target <- common_target(trained)
+  picture <- trainings_picture(trained)
+  # The panels' titles replace the key, which would name the target.
+  dashed <- if (!is.null(target)) paste("dashed line:", target_label(target))
+  picture +
+    ggplot2::labs(subtitle = paste(c(picture$labels$subtitle, dashed), collapse = "\n")) +
     ggplot2::facet_wrap(ggplot2::vars(.data$label), ncol = 2L, labeller = wrapped_strips()) +
     theme_gym_panels() +
     ggplot2::theme(legend.position = "none")

@@ -72,6 +72,12 @@ test_that("a picture has a panel for each setting", {
   picture <- drawn(ggplot2::autoplot(sweep_fake(eval_every = 1, max_steps = 3)))
   built <- ggplot2::ggplot_build(picture)
   expect_identical(nrow(built$layout$layout), 2L)
+  expect_no_match(picture$labels$subtitle, "target")
+  stopping <- sweep_agent(
+    agent_hill_climb, fake_environment(), data.frame(noise = 1:2), seeds = 1:5, iterations = 1,
+    eval_episodes = 2, target = 100
+  )
+  expect_match(ggplot2::autoplot(stopping)$labels$subtitle, "dashed line: target 100")
 })
 
 test_that("arguments of a sweep are checked", {
