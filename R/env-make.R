@@ -197,7 +197,7 @@ server_env <- R6Class(
     },
     step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
       if (private$closed) check_open(self)
-      check_given(action)
+      if (missing(action)) check_given(action)
       step_instance(
         private$instance, action, which, named = TRUE, infos = infos, finals = finals
       )
