@@ -65,7 +65,7 @@
 #' trains in this way.
 #'
 #' @param agent The agent, made by a function such as [agent_ars()], [agent_ppo()] or [agent_q()],
-#'   or your own, see [agent_ask()]. Other methods, such as SAC, TD3 and DDPG, are left to
+#'   or your own, see [agent_ask()]. Other methods, such as SAC, are left to
 #'   Stable-Baselines3 and torch.
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
@@ -157,7 +157,7 @@
 #'   has the class `gym_error_training` (and `gym_error_search` by the tutorial's rule), and its
 #'   field `result` has the finished iterations.
 #' @seealso [evaluate_policy()], [rollout()]
-#' @concept SAC TD3 DDPG A2C
+#' @concept SAC A2C
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' trained <- train_agent(
