@@ -2,9 +2,6 @@
 
 compare_by_scores <- function(trainings, curves, settings, reference, call) {
   if (is.null(curves$env_id)) curves$env_id <- NA_character_
-  interrupted <- unlist(lapply(trainings, function(x) {
-    vapply(each_training(x), function(one) isTRUE(one$interrupted), NA)
-  }))
   found <- run_scores(trainings, curves, settings$total_steps, call)
   runs <- found$runs
   ids <- unique(runs$env_id)
@@ -20,11 +17,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
     by = "scores", table = score_table(scores, drawn, settings$level), runs = runs,
     improvement = improvement_table(scores, drawn, settings$level),
     profile = profile_table(scores, drawn, settings$level), reference = reference,
-    notes = c(
-      found$note,
-      if (any(interrupted)) paste(count_of(sum(interrupted), "interrupted run"), "left out")
-    ),
-    total_steps = found$steps, by_end = found$by_end
+    notes = found$notes, total_steps = found$steps, by_end = found$by_end
   )
 }
 
@@ -32,14 +25,13 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
 #'
 #' If all runs have the same budget in steps, it is the last evaluation. Otherwise it is
 #' interpolated linearly on the learning curve.
-#' @return A list: `runs`, `steps` and `note`, which is `NULL` or says how scores were found.
+#' @return A list: `runs`, `steps`, `by_end`, and `notes`, which say how scores were found.
 #' @noRd
 run_scores <- function(trainings, curves, steps, call) {
-  cut_short <- unlist(lapply(names(trainings), function(label) {
-    ones <- unlist(lapply(trainings[names(trainings) == label], each_training), recursive = FALSE)
-    ended <- vapply(ones, function(one) isTRUE(one$interrupted), NA)
-    vapply(ones[ended], function(one) paste(label, one$env_id, one$seed), "")
-  }))
+  cut_short <- unlist(Map(function(x, label) {
+    ended <- Filter(function(one) isTRUE(one$interrupted), each_training(x))
+    vapply(ended, function(one) paste(label, one$env_id, one$seed), "")
+  }, trainings, names(trainings)))
   curves <- curves[!paste(curves$training, curves$env_id, curves$seed) %in% cut_short, ]
   key <- paste(curves$training, curves$env_id, curves$seed)
   of_run <- split(curves, factor(key, unique(key)))
@@ -77,8 +69,10 @@ run_scores <- function(trainings, curves, steps, call) {
   list(
     runs = data.frame(runs, steps = unname(ends), score = unname(score), row.names = NULL),
     steps = at, by_end = by_end,
-    note = if (!by_end) paste("scores are those of the learning curves after", number_text(at),
-                              "steps")
+    notes = c(
+      if (!by_end) paste("scores are those of the learning curves after", number_text(at), "steps"),
+      if (length(cut_short)) paste(count_of(length(cut_short), "interrupted run"), "left out")
+    )
   )
 }
 
