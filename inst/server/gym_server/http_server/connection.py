@@ -262,26 +262,24 @@ class Connection:
     def _respond(self, request: Request) -> Response:
         if request.refusal is not None:
             return request.refusal
-        try:
-            environ = self._environ(request)
-        except HttpParserError as error:
-            return self._app.refuse(400, str(error))
-        if not self._is_recognized:
-            self._recognize(environ)
-        return self._app.respond(environ)
-
-    def _environ(self, request: Request) -> dict:
         # A client that plays sends the same head with every step.
-        if not (self._last is not None and request.same_head(self._last)):
-            self._last, self._last_environ = request, {**self._base_environ, **request.environ()}
+        if self._last is None or not request.same_head(self._last):
+            try:
+                self._last_environ = {**self._base_environ, **request.environ()}
+            except HttpParserError as error:
+                return self._app.refuse(400, str(error))
+            self._last = request
         body = bytes(request.body)
         request.body = b""
-        return {
+        environ = {
             **self._last_environ,
             "CONTENT_LENGTH": str(len(body)),
             "wsgi.input": io.BytesIO(body),
             "gym_server.is_connected": self._is_connected,
         }
+        if not self._is_recognized:
+            self._recognize(environ)
+        return self._app.respond(environ)
 
     def _is_connected(self) -> bool:
         """Return whether the client's end is still open; called by the serving thread."""
