@@ -2,16 +2,16 @@
 
 #' Call a function with the vector environment of an environment
 #'
-#' A vector environment that was made for this is closed when `use` returns.
+#' A vector environment that was made for this is closed when `play` returns.
 #' @param episodes The largest number of episodes.
-#' @param use A function of the vector environment.
+#' @param play A function of the vector environment.
 #' @param max_steps The user's value. A smaller limit of the environment gives a warning.
 #' @param ... Further arguments of [as_vector_env()].
 #' @param client The user's client. Its default starts a server, so it is only passed on: a method
 #'   for an environment without a server never evaluates it.
 #' @param seed The seed of a random map, see [with_random_map()].
 #' @noRd
-with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = gym_client(),
+with_vector_env <- function(env, episodes, play, max_steps = NULL, ..., client = gym_client(),
                             seed = NULL, call = rlang::caller_env()) {
   # Errors from making the environment should name the user's call, too.
   rlang::local_error_call(call)
@@ -44,7 +44,7 @@ with_vector_env <- function(env, episodes, use, max_steps = NULL, ..., client = 
     vector_env$make_stepped <- make
   }
   warn_of_own_limit(max_steps, vector_env, call)
-  value <- use(vector_env)
+  value <- play(vector_env)
   finished <- TRUE
   value
 }

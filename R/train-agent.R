@@ -242,8 +242,8 @@ training_job <- function(given, kwargs, client, call) {
   if (!is.null(run)) run$settings <- settings
   list(
     settings = settings, files = files, seeds = seeds, run = run,
-    in_env = function(use, max_steps = NULL) {
-      with_training_env(settings, use, max_steps, client, call)
+    in_env = function(play, max_steps = NULL) {
+      with_training_env(settings, play, max_steps, client, call)
     }
   )
 }
@@ -251,7 +251,7 @@ training_job <- function(given, kwargs, client, call) {
 least_sub_envs <- 100
 
 # Candidates are played in parallel even if an evaluation has few episodes.
-with_training_env <- function(settings, use, max_steps, client, call) {
+with_training_env <- function(settings, play, max_steps, client, call) {
   episodes <- if (settings$search) {
     as.numeric(settings$iterations %||% least_sub_envs) * settings$episodes
   } else {
@@ -262,7 +262,7 @@ with_training_env <- function(settings, use, max_steps, client, call) {
   kwargs <- if (is.null(settings$sampled)) settings$kwargs
   evaluated <- NULL
   on.exit(if (!is.null(evaluated)) evaluated$close(wait = FALSE))
-  use_both <- function(vector_env) {
+  play_both <- function(vector_env) {
     if (calls_r(played) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
       # The learner plays alone, its evaluations need not.
       vector_env$make_evaluated <- function() {
@@ -275,11 +275,11 @@ with_training_env <- function(settings, use, max_steps, client, call) {
         evaluated
       }
     }
-    use(vector_env)
+    play(vector_env)
   }
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    played, episodes, use_both, max_steps, !!!kwargs, num_envs = settings$num_envs,
+    played, episodes, play_both, max_steps, !!!kwargs, num_envs = settings$num_envs,
     num_workers = settings$num_workers, client = client, call = call
   ))
 }

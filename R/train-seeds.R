@@ -43,7 +43,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
       return(train_in_futures(vector_env, runs, keep, call))
     }
     anew <- length(vector_env$remembers) && !is_playable(settings$env)
-    with_env <- if (anew) in_env else function(use, max_steps) use(vector_env)
+    with_env <- if (anew) in_env else function(play, max_steps) play(vector_env)
     for (run in runs) {
       training <- train_seed(run, with_env, client, call)
       keep(training)
@@ -191,10 +191,10 @@ run_task.gym_task_training <- function(task) {
   # The plan already uses the cores.
   if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
-  with_env <- function(use, max_steps) {
+  with_env <- function(play, max_steps) {
     with_training_env(settings, function(vector_env) {
       check_worker_gymnasium(task, vector_env$client)
-      use(vector_env)
+      play(vector_env)
     }, NULL, gym_client(), call)
   }
   train_seed(task$run, with_env, gym_client(), call)

@@ -189,7 +189,7 @@ sweep_runs <- function(agents, env, seeds, dots, folder, progress, client, call)
   train_here <- function() {
     for (run in runs) {
       in_env <- jobs[[run$job]]$in_env
-      result <- train_seed(run, function(use, ignored) in_env(use, max_steps), client, call)
+      result <- train_seed(run, function(play, ignored) in_env(play, max_steps), client, call)
       if (isTRUE(result$interrupted)) rlang::interrupt()
       keep(result)
     }
