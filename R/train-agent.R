@@ -70,7 +70,8 @@
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
 #'   the agent's help page. Most agents start with its weights. A learner such as [agent_q()] makes
-#'   its own policy, and can start with a [policy_table()] of values.
+#'   its own policy, and can start with a [policy_table()] of values. Give an earlier training to
+#'   start with its policy.
 #' @param iterations,total_steps The number of iterations, or of steps of the environment, after
 #'   which training ends, whole numbers of at least 1. The last iteration is played to its end. Give
 #'   at least one of the two.
@@ -208,7 +209,7 @@ training_job <- function(given, kwargs, client, call) {
     list(
       kwargs = kwargs,
       # A learner makes its own.
-      policy = given$policy %||% if (!online) default_policy(agent),
+      policy = trained_policy(given$policy) %||% if (!online) default_policy(agent),
       evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
       # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
       search = solved_by == "candidate",

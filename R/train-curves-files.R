@@ -10,7 +10,8 @@ read_curves <- function(path, call) {
     gym_abort(
       c(paste0("\"", path, "\" has no log of a training."),
         i = paste("A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of",
-                  "Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.")),
+                  "Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`."),
+        i = if (endsWith(path, ".rds")) "A result that `readRDS()` returns is an argument, too."),
       class = "gym_error_argument", argument = "...", value = path, call = call
     )
   }
@@ -49,8 +50,18 @@ own_curves <- function(path) {
   run_rows(path, rows, env_id = config$env, seed = config$seed)
 }
 
+# Files of saveRDS() contain zeros.
+is_text <- function(file) {
+  opened <- gzfile(file, "rb")
+  on.exit(close(opened))
+  !any(readBin(opened, "raw", 1000L) == as.raw(0L))
+}
+
 # The first line identifies the kind of file.
 file_curves <- function(file) {
+  if (!is_text(file)) {
+    return(NULL)
+  }
   first <- readLines(file, 1L, warn = FALSE)
   if (!length(first)) {
     return(NULL)

@@ -435,6 +435,14 @@ test_that("drawn weights are not what the agent draws first", {
   expect_false(any(coef(start) %in% coef(trained)))
 })
 
+test_that("an earlier training is the policy to start with", {
+  first <- quiet_training(agent_hill_climb(), iterations = 2, target = Inf, seed = 1)
+  train <- function(policy) {
+    quiet_training(agent_hill_climb(), policy = policy, iterations = 1, target = Inf, seed = 2)
+  }
+  expect_identical(coef(train(first)), coef(train(first$policy)))
+})
+
 test_that("a training that had ended keeps where it came from", {
   path <- local_checkpoint()
   play <- function() quiet_training(agent_ars(), iterations = 1, checkpoint = path)

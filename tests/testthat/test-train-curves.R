@@ -117,6 +117,9 @@ test_that("what is no log, or no training, is refused", {
   for (wrong in list(folder, file.path(folder, "other.csv"), "no-such-folder", 3)) {
     expect_error(learning_curves(x = wrong), class = "gym_error_argument")
   }
+  kept <- file.path(folder, "kept.rds")
+  saveRDS(as.list(1:1000), kept)
+  expect_no_warning(expect_error(learning_curves(kept), "readRDS", class = "gym_error_argument"))
   search <- search_random(fake_environment(), rounds = 2, seed = 1)
   expect_error(learning_curves(search), "agent_random", class = "gym_error_argument")
 })
