@@ -2,7 +2,7 @@
 #
 #   tools/in-env Rscript --no-init-file tools/blackjack.R
 #
-# Takes a minute, or two on a busy machine.
+# Takes half a minute.
 library(gym)
 source("vignettes/pictures.R")
 
