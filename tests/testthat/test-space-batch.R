@@ -113,7 +113,7 @@ test_that("the error for a wrong number of sub-environments has both numbers", {
 
 test_that("the sub-environment whose value does not fit is named, counted from 1, with its value", {
   spaces <- sub_envs_of_spaces()
-  error <- refused(spaces$discrete, c(5, 6, NA, 7), 4L, "Sub-environment 3: ", "value NA_real_ ",
+  error <- refused(spaces$discrete, c(5, 6, NA, 7), 4L, "Sub-environment 3: ", "value NA ",
                    "<Discrete 3 from 5>")
   expect_identical(error$sub_env, 3L)
   refused(spaces$discrete, c(5, 6.5), 2L, "Sub-environment 2: ", "6.5")
