@@ -55,8 +55,13 @@ without_network <- function(text) {
   sub('<script src="((../)*)pkgdown[.]js"></script>', '<script src="\\1search.js"></script>', text)
 }
 
+# pkgdown shortens the paths of knitr's pictures, but not those of its animations.
+link_to_animations <- function(text) {
+  gsub(paste0('src="([.][.]/)+', folder, "/articles/"), 'src="', text)
+}
+
 change_page <- function(page) {
-  text <- without_network(readLines(page, encoding = "UTF-8"))
+  text <- link_to_animations(without_network(readLines(page, encoding = "UTF-8")))
   if (dirname(page) == folder) text <- link_to_pages(text)
   writeLines(text, page, useBytes = TRUE)
 }
