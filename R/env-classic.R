@@ -113,8 +113,9 @@ env_list_all <- function(x) {
 
 #' Start a new episode
 #'
-#' Reset an environment before its first step and after the end of each episode. A vector environment
-#' resets its sub-environments after their ends by itself, unless its autoreset mode is `"Disabled"`.
+#' Reset an environment before its first step and after the end of each episode. A vector
+#' environment resets its sub-environments after their ends by itself, unless its autoreset mode is
+#' `"Disabled"`.
 #'
 #' @inheritParams env_create
 #' @param instance_id An instance's id, as returned by [env_create()].
