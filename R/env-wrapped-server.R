@@ -112,10 +112,9 @@ check_takes_function <- function(wrappers, call) {
   wrong <- Filter(function(wrapper) any(vapply(wrapper, is.function, NA)), wrappers)
   if (length(wrong)) {
     name <- wrong[[1L]][[1L]]
-    near <- nearest_name(name, names(transforms))
     gym_abort(
       c(paste0("The wrapper ", name, " does not take an R function."),
-        i = if (length(near)) paste0("Did you mean ", near, "?"),
+        i = did_you_mean(name, names(transforms), "%s"),
         i = paste0("These do: ", paste(names(transforms), collapse = ", "), ".")),
       class = "gym_error_argument", argument = "wrapper", value = name, call = call
     )

@@ -137,13 +137,13 @@ check_are_trainings <- function(given, call) {
     return()
   }
   name <- names(wrong)[[1L]]
-  near <- nearest_name(name, setdiff(names(formals(compare_trainings)), "..."))
+  choices <- setdiff(names(formals(compare_trainings)), "...")
   several <- is.list(wrong[[1L]]) &&
     any(vapply(wrong[[1L]], inherits, NA, c("gym_training", "gym_trainings")))
   gym_abort(
     c(paste0(if (nzchar(name)) paste0("`", name, "`") else "Each argument",
              " must be a training, not ", describe_argument(wrong[[1L]]), "."),
-      i = if (nzchar(name) && length(near)) paste0("Did you mean `", near, "`?"),
+      i = if (nzchar(name)) did_you_mean(name, choices),
       i = if (inherits(wrong[[1L]], "gym_sweep")) "`sweep$comparison` compares its settings.",
       i = if (several) "`do.call(compare_trainings, x)` compares the trainings of a list."),
     class = "gym_error_argument", argument = "...", value = wrong[[1L]], call = call

@@ -134,10 +134,9 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
 check_settings <- function(names, known, call) {
   unknown <- setdiff(names, known)
   if (length(unknown) && !"..." %in% known) {
-    near <- nearest_name(unknown[[1L]], known)
     gym_abort(
       c(paste0("The agent has no argument `", unknown[[1L]], "`, a column of `settings`."),
-        i = if (length(near)) paste0("Did you mean `", near, "`?"),
+        i = did_you_mean(unknown[[1L]], known),
         i = paste0("It has ", paste0("`", known, "`", collapse = ", "), ".")),
       class = "gym_error_argument", argument = "settings", value = unknown, call = call
     )
