@@ -9,19 +9,18 @@ new_adam <- function(count) list(mean = numeric(count), square = numeric(count),
 #' @return A list: `weights` and `adam`.
 #' @noRd
 adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
+  # An operation with all weights takes some percent of an update, so there are few of them: this
+  # mean is 0.9 * mean + 0.1 * gradient.
   steps <- adam$steps + 1
-  mean <- 0.9 * adam$mean + 0.1 * gradient
-  square <- 0.999 * adam$square + 0.001 * (gradient * gradient)
+  mean <- adam$mean + 0.1 * (gradient - adam$mean)
+  square <- adam$square + 0.001 * (gradient * gradient - adam$square)
   size <- learning_rate / (1 - 0.9^steps)
-  deviation <- sqrt(square) / sqrt(1 - 0.999^steps) + epsilon
-  list(
-    weights = weights - size * mean / deviation,
-    adam = list(mean = mean, square = square, steps = steps)
-  )
+  weights <- weights - size * (mean / (sqrt(square) * (1 / sqrt(1 - 0.999^steps)) + epsilon))
+  list(weights = weights, adam = list(mean = mean, square = square, steps = steps))
 }
 
 # Shortens a gradient to the length `longest` if it is longer.
 clip_norm <- function(gradient, longest) {
-  norm <- sqrt(sum(gradient * gradient))
+  norm <- sqrt((gradient %*% gradient)[[1L]])
   if (isTRUE(norm > longest)) gradient * (longest / (norm + 1e-6)) else gradient
 }

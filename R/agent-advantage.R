@@ -46,7 +46,9 @@ scale_rewards <- function(reward, last, gamma, moments) {
 }
 
 standardized <- function(x) {
-  if (length(x) < 2L) x - mean(x) else (x - mean(x)) / (stats::sd(x) + 1e-8)
+  n <- length(x)
+  deviation <- x - sum(x) / n
+  if (n < 2L) deviation else deviation / (sqrt(sum(deviation * deviation) / (n - 1)) + 1e-8)
 }
 
 explained_variance <- function(value, return) {

@@ -132,15 +132,17 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
   }
   weights <- c(weight_vector(agent$policy), weight_vector(agent$value))
 
-  # Log-probabilities and values by the networks that played.
+  # Log-probabilities and values by the networks that played. The outputs of hidden layers for all
+  # steps are not kept: they would fill most of the memory after which R collects garbage.
   before <- ppo_forward(agent$policy, agent$value, weights, rows$inputs, rows$action)
+  before <- list(log_prob = before$draws$log_prob, value = before$value)
   last_value <- expected_values(agent$value, rows$last_inputs)
   after <- next_values(before$value, last_value, rows$terminated, rows$last)
   rows$advantage <- estimate_advantages(
     reward, before$value, after, rows$last, agent$gamma, agent$lambda
   )
   rows$return <- rows$advantage + before$value
-  rows$log_prob <- before$draws$log_prob
+  rows$log_prob <- before$log_prob
 
   epochs <- lapply(seq_len(agent$epochs), function(epoch) {
     draw_minibatches(length(reward), agent$batch)
@@ -224,11 +226,13 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
     ),
     backward_network(both$of_value, matrix(2 * settings$value_weight / n * error, 1L))
   )
-  policy_loss <- -mean(objective)
-  value_loss <- mean(error * error)
-  entropy_loss <- -mean(both$draws$entropy)
+  # Means without mean(), whose method takes as long as a small product of matrices.
+  policy_loss <- -sum(objective) / n
+  value_loss <- sum(error * error) / n
+  entropy_loss <- -sum(both$draws$entropy) / n
   list(gradient = gradient, log = c(
-    approx_kl = mean(ratio - 1 - log_ratio), clip_fraction = mean(abs(ratio - 1) > settings$clip),
+    approx_kl = sum(ratio - 1 - log_ratio) / n,
+    clip_fraction = sum(abs(ratio - 1) > settings$clip) / n,
     entropy_loss = entropy_loss, policy_gradient_loss = policy_loss, value_loss = value_loss,
     loss = policy_loss + settings$entropy * entropy_loss + settings$value_weight * value_loss
   ))
@@ -236,8 +240,7 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
 
 ppo_forward <- function(policy, value, weights, inputs, action) {
   of_policy <- forward_draws(policy, weights, inputs, action)
-  # Negative numbers, for all but the policy's, take four times as long.
-  of_value <- forward_network(value, weights[(count_weights(policy) + 1L):length(weights)], inputs)
+  of_value <- forward_network(value, weights, inputs, start = count_weights(policy))
   list(
     draws = of_policy$draws, value = of_value$outputs[1L, ], of_policy = of_policy,
     of_value = of_value

@@ -5,15 +5,16 @@
 
 #' Split a vector of weights into layers
 #' @param policy A network, for its sizes. Its own weights are ignored.
-#' @param weights Its weights, in the order of `coef()`.
+#' @param weights Its weights, in the order of `coef()`. Others may come before and after them.
+#' @param start The number of weights before them.
 #' @return A list with a list for each layer: `weights`, a matrix with a row for each neuron, `bias`
 #'   (`NULL` for none).
 #' @noRd
-layers_of <- function(policy, weights) {
+layers_of <- function(policy, weights, start = 0L) {
   sizes <- policy$sizes
   bias <- isTRUE(policy$bias)
   layers <- vector("list", length(sizes) - 1L)
-  end <- 0L
+  end <- start
   # A loop, because this runs for each minibatch.
   for (i in seq_along(layers)) {
     neurons <- sizes[[i + 1L]]
@@ -34,18 +35,20 @@ layers_of <- function(policy, weights) {
 #'   backward_network(): `layers`, `activation` and `signals` (the inputs, then the outputs of each
 #'   layer).
 #' @noRd
-forward_network <- function(policy, weights, inputs) {
-  forward_layers(layers_of(policy, weights), policy$activation, inputs)
+forward_network <- function(policy, weights, inputs, start = 0L) {
+  forward_layers(layers_of(policy, weights, start), policy$activation, inputs)
 }
 
 forward_layers <- function(layers, activation, inputs) {
   signals <- vector("list", length(layers) + 1L)
   signals[[1L]] <- inputs
   for (i in seq_along(layers)) {
-    sums <- layers[[i]]$weights %*% signals[[i]]
-    if (!is.null(layers[[i]]$bias)) sums <- sums + layers[[i]]$bias
     signals[[i + 1L]] <- switch(activation[[i]],
-      tanh = quick_tanh(sums), ReLU = quick_relu(sums), activate(sums, activation[[i]])
+      # Twice as fast as tanh(), which takes a third of an update, with an error of at most 4e-16. R
+      # computes it in the memory of the sums, as they have no name.
+      tanh = 1 - 2 / (exp(2 * layer_sums(layers[[i]], signals[[i]])) + 1),
+      ReLU = quick_relu(layer_sums(layers[[i]], signals[[i]])),
+      activate(layer_sums(layers[[i]], signals[[i]]), activation[[i]])
     )
   }
   list(
@@ -54,8 +57,9 @@ forward_layers <- function(layers, activation, inputs) {
   )
 }
 
-# Twice as fast as tanh(), which takes a third of an update, with an error of at most 4e-16.
-quick_tanh <- function(x) 1 - 2 / (exp(x + x) + 1)
+layer_sums <- function(layer, inputs) {
+  if (is.null(layer$bias)) layer$weights %*% inputs else layer$weights %*% inputs + layer$bias
+}
 
 # Six times as fast as looking for negative numbers, which took a third of an update, with the same
 # result for finite numbers.
@@ -77,12 +81,18 @@ backward_network <- function(forward, slopes) {
     if (activation[[i]] != "identity") {
       slopes <- slopes * activation_slope(signals[[i + 1L]], activation[[i]])
     }
-    gradient[[2L * i - 1L]] <- tcrossprod(slopes, signals[[i]])
+    gradient[[2L * i - 1L]] <- times_transposed(slopes, signals[[i]])
     if (!is.null(layers[[i]]$bias)) gradient[[2L * i]] <- slopes %*% ones
-    if (i > 1L) slopes <- crossprod(layers[[i]]$weights, slopes)
+    if (i > 1L) slopes <- transposed_times(layers[[i]]$weights, slopes)
   }
   unlist(gradient)
 }
+
+# R's own BLAS, which most users have, multiplies by a transposed matrix in twice the time that it
+# takes to transpose the matrix and multiply. Faster libraries do it in the same time.
+times_transposed <- function(x, y) if (has_reference_blas()) x %*% t(y) else tcrossprod(x, y)
+
+transposed_times <- function(x, y) if (has_reference_blas()) t(x) %*% y else crossprod(x, y)
 
 #' Put observations into the columns of a matrix, prepared for the network
 #' @param values A matrix with an observation in each row.

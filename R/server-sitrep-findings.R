@@ -11,13 +11,9 @@ sitrep_versions <- function() {
   )
 }
 
-# The library that multiplies matrices. R's own has no file name (Windows) or is Rblas; Debian's
-# reference is libblas itself. Measured: updates of PPO with 64 and 256 rows and of DQN, two hidden
-# layers of 64.
+# Measured: updates of PPO with 64 and 256 rows and of DQN, two hidden layers of 64.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
-  # A fast one may also be a libblas.so.3, in a folder with its name.
-  slow <- !nzchar(file) || grepl("Rblas|/libblas[.]", file) && !grepl("openblas|atlas|blis", file)
-  if (!slow) {
+  if (!is_reference_blas(file)) {
     return(finding("R", "BLAS", file))
   }
   finding("R", "BLAS", paste0(

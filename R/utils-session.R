@@ -8,6 +8,7 @@
 #   keys            the idempotency keys of this process, see http-connection.R
 #   environments    the environments written in R that are registered, by their ids
 #   hidden          tokens, which errors must not show
+#   reference_blas  whether R multiplies matrices by its own library, see has_reference_blas()
 #
 # and, if needed, addresses for which the user declined a server, and the function by which an upper
 # layer asks, see prompted_server_starts().
@@ -19,3 +20,4 @@ the_session$servers <- list()
 the_session$environments <- list()
 the_session$client <- NULL
 the_session$instances <- new.env(parent = emptyenv())
+the_session$reference_blas <- NULL

@@ -87,3 +87,18 @@ test_that("what does not fit is refused", {
   refused(policy_log_prob_gradient(softmax, observation, c(0, 1), 1:3), "weights")
   refused(policy_output_gradient(softmax, observation, 1:2), "weights")
 })
+
+test_that("a session with R's own BLAS computes the same gradient as one with a fast one", {
+  set.seed(1)
+  policy <- policy_network(c(3, 5, 4, 2), output = "softmax", bias = TRUE)
+  observation <- matrix(rnorm(21), 7)
+  action <- rbinom(7, 1, 0.5)
+  gradient_with <- function(reference) {
+    before <- the_session$reference_blas
+    withr::defer(the_session$reference_blas <- before)
+    the_session$reference_blas <- reference
+    policy_log_prob_gradient(policy, observation, action)
+  }
+  expect_equal(gradient_with(TRUE), gradient_with(FALSE), tolerance = 1e-12)
+  expect_true(any(gradient_with(TRUE) != 0))
+})
