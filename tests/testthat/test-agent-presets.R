@@ -29,13 +29,25 @@ test_that("a preset belongs to an id with the same arguments", {
   expect_null(find_preset("ars", fake_environment(id = "CartPole-v1"), list()))
 })
 
-test_that("the preset of an agent that follows gradients may normalise observations", {
-  policy_of <- function(env_id) {
-    preset <- find_preset("ppo", env_id, list())
+test_that("the preset of an agent that follows gradients may change the network", {
+  policy_of <- function(agent, env_id) {
+    preset <- find_preset(agent, env_id, list())
     preset_policy(preset, preset_agent(preset))
   }
-  expect_identical(policy_of("Acrobot-v1")$moments, no_moments())
-  expect_null(policy_of("CartPole-v1")$moments)
+  expect_identical(policy_of("ppo", "Acrobot-v1")$moments, no_moments())
+  expect_null(policy_of("ppo", "CartPole-v1")$moments)
+  of_car <- policy_of("dqn", "MountainCar-v0")
+  expect_identical(of_car$sizes, c(NA, 256L, 256L, NA))
+  expect_identical(of_car$init, "uniform")
+  car <- fake_environment(
+    observation_space = box_space(c(-1, -1), c(1, 1)), action_space = discrete_space(3L)
+  )
+  bound <- policy_bind(of_car, car)
+  expect_identical(lengths(bound$weights), c(3L, 257L, 257L) * c(256L, 256L, 3L))
+  # Orthogonal weights are a tenth as large.
+  expect_gt(max(abs(bound$weights[[2]])), 0.99)
+  expect_identical(policy_of("dqn", "CartPole-v1")[c("sizes", "init")],
+                   list(sizes = c(NA, 64L, 64L, NA), init = "orthogonal"))
 })
 
 test_that("a search takes its preset, says so, and lets arguments go before it", {

@@ -15,6 +15,7 @@ CartPole-v1,,dqn,475,registered,490,1,20
 Acrobot-v1,,ars,-100,registered,-90,1,20
 Acrobot-v1,,ppo,-100,registered,-90,1,20
 Acrobot-v1,,dqn,-100,registered,-90,1,20
+MountainCar-v0,,dqn,-110,registered,-105,1,10
 MountainCarContinuous-v0,,ars,90,registered,92,1,20
 LunarLander-v3,continuous,ars,200,registered,220,1,20
 LunarLander-v3,continuous,ppo,200,registered,215,1,20
