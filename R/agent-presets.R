@@ -17,8 +17,8 @@
 #'   have or whose default it keeps.}
 #'   \item{hidden, bias}{The policy of a search: the number of hidden neurons (tanh, with normalised
 #'   observations), `NA` for a linear policy, and whether it has a bias.}
-#'   \item{hidden, init, normalize}{The network of the other agents: the number of neurons in each of
-#'   its two hidden layers and how its first weights are drawn, `NA` for the agent's default (64,
+#'   \item{hidden, init, normalize}{The network of the other agents: the number of neurons in each
+#'   of its two hidden layers and how its first weights are drawn, `NA` for the agent's default (64,
 #'   `"orthogonal"`), and whether it gets normalised observations.}
 #'   \item{linear, epsilon_steps}{If `linear` is `TRUE`, `learning_rate` and `clip` decrease from
 #'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
