@@ -27,7 +27,7 @@ Swimmer-v5,,cem,325,paper (registered 360),335,3,20
 HalfCheetah-v5,,ars,3430,paper (registered 4800),3500,1,10
 HalfCheetah-v5,,ppo,3430,paper (registered 4800),3500,1,3
 Pendulum-v1,,cem,-200,ours,-155,2,10
-Pendulum-v1,,ppo,-200,ours,-155,2,20
+Pendulum-v1,,ppo,-200,ours,-155,3,20
 Hopper-v5,,ars,3120,paper (registered 3800),3250,1,1
 Hopper-v5,,ppo,3120,paper (registered 3800),3250,1,3
 BipedalWalker-v3,,ars,300,registered,305,1,1
