@@ -15,9 +15,9 @@
 
 gradient_names <- c(gym = "gym, learn_ppo()", sb3 = "Stable-Baselines3, PPO")
 
-# The settings of rl-baselines3-zoo (hyperparams/ppo.yml), but half as many rows for LunarLander: with
-# its 16,384 most trainings of both failed. `target` is the mean return of 100 episodes, `cap` the
-# steps at which a training has failed.
+# The settings of rl-baselines3-zoo (hyperparams/ppo.yml), but half as many rows for LunarLander:
+# with its 16,384 most trainings of both failed. `target` is the mean return of 100 episodes, `cap`
+# the steps at which a training has failed.
 gradient_tasks <- list(
   "CartPole-v1" = list(
     num_envs = 8, rows = 256, batch = 256, epochs = 20, discount = 0.98, lambda = 0.8,

@@ -3,9 +3,9 @@
 # of seeds. The settings are the presets of the package (agent_presets()).
 #
 # Settings were tried on the seeds 1 to 99. The first choice of them is reported on the seeds from
-# 1001 on. Where it missed its goal, or was slow, and another one was chosen, again on the seeds 1 to
-# 99, that is reported on the seeds from 2001 on, and so on; the rows of the first choice stay in the
-# table.
+# 1001 on. Where it missed its goal, or was slow, and another one was chosen, again on the seeds 1
+# to 99, that is reported on the seeds from 2001 on, and so on; the rows of the first choice stay in
+# the table.
 
 solve_jobs <- utils::read.csv(text = "
 env_id,kwargs,method,target,target_source,train_target,choice,seeds
