@@ -13,7 +13,7 @@ fewer_colours <- function(files, max = 32) {
 
 # Sets the options of a vignette's chunks. Their pictures get fewer colours if magick is there. The
 # site has room, so its pictures stay as pkgdown draws them.
-set_up_pictures <- function(height) {
+set_up_pictures <- function(height, colours = 32) {
   knitr::opts_chunk$set(collapse = TRUE, comment = "#>", fig.width = 7, fig.height = height)
   if (identical(Sys.getenv("IN_PKGDOWN"), "true")) {
     return(invisible())
@@ -22,7 +22,7 @@ set_up_pictures <- function(height) {
   write_link <- knitr::knit_hooks$get("plot")
   knitr::knit_hooks$set(plot = function(x, options) {
     was_drawn <- startsWith(x, options$fig.path) && grepl("[.]png$", x)
-    if (was_drawn && requireNamespace("magick", quietly = TRUE)) fewer_colours(x)
+    if (was_drawn && requireNamespace("magick", quietly = TRUE)) fewer_colours(x, colours)
     write_link(x, options)
   })
 }
