@@ -65,11 +65,11 @@ limited_values <- function(backup, probabilities, limit, discount, call) {
     return(policy_values(backup, probabilities, discount, call)$values)
   }
   used <- which(probabilities > 0)
-  if (length(used) > backup$states || !is.null(backup$flow)) {
+  state <- (used - 1L) %% backup$states + 1L
+  if (anyDuplicated(state) || !is.null(backup$flow)) {
     return(horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities)))
   }
-  # One action in each state: only its row is used.
-  state <- (used - 1L) %% backup$states + 1L
+  # No state has several actions: only the rows of these actions are used.
   weight <- discount * backup$weight[used, , drop = FALSE] * probabilities[used]
   next_state <- backup$next_state[used, , drop = FALSE]
   expected <- backup$expected[used] * probabilities[used]
