@@ -56,7 +56,8 @@ new_trace <- function(store, decay, replacing, sparse = replacing) {
       strength[active] <<- faded
       before <- strength[cells]
       before[is.na(before)] <- 0
-      if (length(strength) < max(cells)) {
+      # A row of zeros, or a state with a single action, uses no weight.
+      if (length(strength) < max(0, cells)) {
         strength <<- c(strength, numeric(length(store$get()) - length(strength)))
       }
       active <<- c(active, cells[before == 0])

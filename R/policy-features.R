@@ -211,7 +211,7 @@ new_feature_policy <- function(basis, weights, env) {
 
 #' @exportS3Method
 act_batch.gym_policy_features <- function(policy, observation, n, vector_env) {
-  values <- linear_values(policy$basis, policy$weights, policy$basis$of(observation, n))
+  values <- feature_values(policy, observation, n)
   as.integer(draw_table_actions(policy, values) - 1L + policy$action_space$start)
 }
 
@@ -228,7 +228,15 @@ predict_policy.gym_policy_features <- function(policy, newdata, type, call = rla
   }
   if (type == "probability") abort_no_probabilities(policy, call)
   observed <- observed_batch(newdata, policy$observation_space)
-  linear_values(policy$basis, policy$weights, policy$basis$of(observed$batch, observed$n))
+  feature_values(policy, observed$batch, observed$n)
+}
+
+# A row for each observation. A user's function is not asked about none.
+feature_values <- function(policy, observation, n) {
+  if (n == 0L) {
+    return(policy$weights[0L, , drop = FALSE])
+  }
+  linear_values(policy$basis, policy$weights, policy$basis$of(observation, n))
 }
 
 #' @export

@@ -250,6 +250,11 @@ check_was_played <- function(policy, call) {
 #' @return The result of predict(), with a data frame of one column as a vector.
 #' @noRd
 model_predictions <- function(policy, columns, call) {
+  if (!length(columns[[1L]])) {
+    # Many models cannot predict for no observations.
+    width <- prod(policy$action_space$shape)
+    return(if (width == 1) numeric() else matrix(numeric(), 0L, width))
+  }
   load_model_package(policy, call)
   has_formula <- !is.null(tryCatch(stats::terms(policy$model), error = function(cnd) NULL))
   newdata <- if (has_formula) list2DF(columns) else do.call(cbind, columns)
@@ -279,7 +284,8 @@ model_actions <- function(policy, columns, call) {
     predicted <- largest_output(policy, predicted, call)
   }
   check_predictions(policy, predicted, n, if (discrete) 1L else prod(space$shape), call)
-  values <- matrix(if (is.factor(predicted)) as.character(predicted) else predicted, n)
+  values <- if (is.factor(predicted)) as.character(predicted) else predicted
+  values <- matrix(values, n, NCOL(predicted))
   actions <- if (discrete) chosen_actions(policy, values[, 1L]) else values
   wrong <- if (discrete) is.na(actions) else !is.finite(actions)
   if (any(wrong)) {

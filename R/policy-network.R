@@ -262,6 +262,10 @@ act_batch.gym_policy_by_column <- function(policy, observation, n, vector_env) {
 #' @noRd
 network_outputs <- function(policy, values, call = rlang::caller_env()) {
   signal <- network_inputs(policy, values, call)
+  # Some activations make a vector of a matrix without rows.
+  if (!nrow(signal)) {
+    return(matrix(0, 0L, policy$sizes[[length(policy$sizes)]]))
+  }
   for (layer in seq_along(policy$weights)) {
     signal <- with_bias(signal, policy)
     signal <- activate(tcrossprod(signal, policy$weights[[layer]]), policy$activation[[layer]])

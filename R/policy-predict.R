@@ -81,5 +81,5 @@ observations_from <- function(newdata, policy, call) {
     check_columns(newdata, names, "newdata", call)
     newdata <- newdata[names]
   }
-  if (discrete) newdata[[1L]] else unname(as.matrix(newdata))
+  if (discrete) newdata[[1L]] else unname(frame_rows(newdata))
 }

@@ -99,12 +99,19 @@ is_one_vector <- function(observation) is.atomic(observation) && is.null(dim(obs
 # Observations in the form for functions: a vector is one, in a matrix of one row.
 function_rows <- function(observation) {
   if (is.data.frame(observation)) {
-    as.matrix(observation)
+    frame_rows(observation)
   } else if (is_one_vector(observation)) {
     matrix(observation, nrow = 1L, dimnames = list(NULL, names(observation)))
   } else {
     observation
   }
+}
+
+# A data frame as a matrix. as.matrix() gives one without rows the type logical.
+frame_rows <- function(x) {
+  rows <- as.matrix(x)
+  if (!nrow(rows)) storage.mode(rows) <- "double"
+  rows
 }
 
 #' @export
@@ -266,7 +273,7 @@ observation_rows <- function(observation, space, call = rlang::caller_env()) {
     return(list(values = matrix(observation, nrow = 1L), one = TRUE))
   }
   if (is.data.frame(observation)) {
-    observation <- as.matrix(observation)
+    observation <- frame_rows(observation)
   }
   given <- if (!is.null(axes)) length(axes) else if (length(observation) == 1L) 0L else 1L
   if (given == rank) {
@@ -274,7 +281,8 @@ observation_rows <- function(observation, space, call = rlang::caller_env()) {
   } else if (rank == 0L || is.null(axes)) {
     list(values = matrix(observation, ncol = 1L), one = FALSE)
   } else {
-    list(values = t(matrix(row_major(observation), ncol = axes[[1L]])), one = FALSE)
+    values <- matrix(row_major(observation), prod(axes[-1L]), axes[[1L]])
+    list(values = t(values), one = FALSE)
   }
 }
 

@@ -318,6 +318,25 @@ test_that("an actor moves towards what came to more than its critic had expected
   expect_identical(agent_policy(two)$temperature, 1)
 })
 
+test_that("a step without a choice, or without features, leaves no trace and no warning", {
+  policy <- spaces(states = 2)
+  policy$possible <- rbind(c(TRUE, FALSE), c(TRUE, TRUE))
+  agent <- agent_start(agent_actor_critic(lambda = 0.8, actor_lambda = 0.4), policy)
+  learner <- learner_of(agent)
+  expect_silent(learner$observe(1L, 1L, 10, 2L, FALSE, FALSE, 1L, NULL))
+  one <- learner$export()
+  expect_equal(one$preferences, rbind(c(0, -Inf), c(0, 0)))
+  expect_equal(one$weights[, 1], c(1, 0))
+  # State 0 has a row of zeros.
+  seeing <- agent_start(
+    agent_sarsa(features = function(state) cbind(state, state), lambda = 0.8), spaces()
+  )
+  expect_silent(zeros <- observe(seeing, step_of(0, 1, 10, 1)))
+  expect_identical(zeros$weights, matrix(0, 2, 2))
+  expect_silent(later <- observe(zeros, step_of(1, 1, 10, 0)))
+  expect_true(all(later$weights[, 2] > 0))
+})
+
 test_that("values have the names of an observation's parts, and each action's a row", {
   policy <- spaces()
   policy$observation_space <- space_dict(hand = space_discrete(2, 5), last = space_discrete(2))

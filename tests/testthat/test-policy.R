@@ -76,6 +76,50 @@ test_that("a data frame of observations is as good as the matrix of them, to eve
   expect_length(act(parts, list(0, 0)), 1L)
 })
 
+test_that("no observations get no actions, from a policy of any kind", {
+  seeing <- function(actions, space = box_space(c(-1, -1), c(1, 1))) {
+    fake_environment(observation_space = space, action_space = actions)
+  }
+  two <- seeing(discrete_space(2L))
+  numbers <- seeing(box_space(c(-1, -1), c(1, 1)))
+  basis <- basis_of(tile_coding(2, 2), two$observation_space, NULL)
+  # A function that gives one row for none.
+  one_row <- basis_of(function(observation) cbind(1, observation[, 1]), two$observation_space, NULL)
+  steps <- data.frame(obs_1 = c(0.1, 0.9), obs_2 = 0, action = 0:1)
+  none <- list(matrix(0, 0, 2), steps[0, c("obs_1", "obs_2")])
+  choosing <- list(
+    policy_bind(policy_random(), two),
+    policy_bind(policy_network(c(2, 3, 1)), two),
+    policy_bind(policy_network(c(2, 3, 2), output = "softmax", bias = TRUE), two),
+    policy_bind(policy_network(c(2, 2), output = "epsilon-greedy", normalize = TRUE), two),
+    new_feature_policy(basis, matrix(0, basis$count, 2), two),
+    new_feature_policy(one_row, matrix(0, 2, 2), two),
+    policy_bind(as_policy(lm(action ~ obs_1, steps)), two),
+    function(observation) as.integer(observation[, 2] > 0)
+  )
+  for (policy in choosing) for (observation in none) {
+    expect_identical(act(policy, observation), integer())
+    if (!is.function(policy) && !inherits(policy, "gym_policy_random")) {
+      expect_identical(predict(policy, observation), integer())
+    }
+  }
+  drawing <- list(
+    policy_bind(policy_random(), numbers),
+    policy_bind(policy_network(c(2, 3, 2)), numbers),
+    policy_bind(policy_network(c(2, 2), output = "gaussian"), numbers),
+    policy_bind(as_policy(lm(cbind(action, obs_2) ~ obs_1, steps)), numbers)
+  )
+  for (policy in drawing) for (observation in none) {
+    expect_identical(dim(act(policy, observation)), c(0L, 2L))
+  }
+  expect_identical(dim(predict(choosing[[3]], none[[2]], type = "probability")), c(0L, 2L))
+  expect_identical(predict(choosing[[2]], none[[2]], type = "output"), numeric())
+  expect_identical(act(policy_table(diag(3)), integer()), integer())
+  expect_identical(act(policy_table(diag(3)), data.frame(state = integer())), integer())
+  pixels <- seeing(discrete_space(2L), space_box(0, 1, shape = c(2, 3)))
+  expect_identical(act(policy_bind(policy_linear(), pixels), array(0, c(0, 2, 3))), integer())
+})
+
 test_that("observations of another length than the environment's have no features", {
   env <- fake_environment(observation_space = box_space(c(-1, -1), c(1, 1)))
   basis <- basis_of(tile_coding(2, 2), env$observation_space, NULL)
