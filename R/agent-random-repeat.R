@@ -178,7 +178,7 @@ searches_effort_line <- function(x) {
   paste0(
     if (x$interrupted) "Interrupted after " else "Played ", count_of(rounds, "round"), ", ",
     count_of(rounds * x$episodes, "episode"), ", ", count_of(sum(x$searches$steps), "step"),
-    " in ", seconds_text(x$elapsed)
+    elapsed_text(x$elapsed)
   )
 }
 

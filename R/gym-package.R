@@ -49,7 +49,12 @@
 #' `gym.max_answer_bytes`: the largest answer that is accepted from a server, in bytes. The default
 #' is 2^29 (half a gigabyte). The limit for JSON is a sixteenth of this number, because R needs much
 #' more memory for it. A larger answer raises a `gym_error_connection` as soon as the limit is
-#' passed. Compressed answers are not decompressed. `gym.viewer` is described at [env_watch()].
+#' passed. Compressed answers are not decompressed.
+#'
+#' `gym.print_seconds`: does [print()] of a result show how long it took and when it began? `FALSE`
+#' leaves these times out, so that a report with fixed seeds is the same each time it is knitted.
+#'
+#' `gym.viewer` is described at [env_watch()].
 #'
 #' Texts from a server, in errors and names, are shown without control characters and shortened if
 #' they are long.

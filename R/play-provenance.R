@@ -49,8 +49,10 @@ format.gym_provenance <- function(x, ...) {
     seed = if (length(x$seed)) paste(format(x$seed, scientific = FALSE, trim = TRUE),
                                      collapse = ", "),
     preset = if (!is.null(x$preset)) x$preset$origin,
-    started = if (!is.null(x$started)) format(x$started, "%Y-%m-%d %H:%M:%S %Z"),
-    elapsed = if (!is.na(x$elapsed)) seconds_text(x$elapsed)
+    started = if (!is.null(x$started) && prints_times()) {
+      format(x$started, "%Y-%m-%d %H:%M:%S %Z")
+    },
+    elapsed = if (!is.na(x$elapsed)) elapsed_text(x$elapsed, "")
   )
   paste(format(paste0(names(lines), ":")), lines)
 }

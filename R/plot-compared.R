@@ -4,7 +4,7 @@
 #' their intervals (`type = "scores"`, the default), the performance profiles (`"profile"`), or the
 #' probabilities that one training scores higher than another (`"improvement"`). For steps to a
 #' target: the share of runs that have reached it, over the steps of the training, with its
-#' interval. Ticks are runs that ended without reaching it.
+#' interval. Ticks are the ends of runs that failed or were interrupted.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.

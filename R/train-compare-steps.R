@@ -3,19 +3,18 @@
 compare_by_steps <- function(trainings, level) {
   runs <- do.call(rbind, unname(Map(function(x, label) {
     ones <- each_training(x)
+    of_each <- function(f, type) vapply(ones, f, type)
     data.frame(
-      training = label, env_id = vapply(ones, function(one) one$env_id, ""),
-      seed = vapply(ones, function(one) as.numeric(one$seed), 0),
-      steps = vapply(ones, function(one) as.numeric(one$steps), 0),
-      # The last iterations may reach the target without an evaluation that could end the training.
-      reached = vapply(ones, function(one) {
-        one$solved || reaches(one$final$mean_return %||% NA, one$target)
-      }, NA)
+      training = label, env_id = of_each(function(one) one$env_id, ""),
+      seed = of_each(function(one) as.numeric(one$seed), 0),
+      steps = of_each(function(one) as.numeric(one$steps), 0),
+      reached = of_each(function(one) isTRUE(one$solved), NA),
+      interrupted = of_each(function(one) one$interrupted, NA)
     )
   }, trainings, names(trainings))))
   key <- paste(runs$training, runs$env_id, sep = "\r")
   each <- lapply(split(runs, factor(key, unique(key))), function(own) {
-    curve <- kaplan_meier(own$steps, own$reached, level)
+    curve <- kaplan_meier(own$steps, own$reached, !own$reached & !own$interrupted, level)
     first_under <- function(values) curve$steps[which(values <= 0.5)[1L]]
     list(
       table = data.frame(
@@ -34,12 +33,13 @@ compare_by_steps <- function(trainings, level) {
 }
 
 #' Estimate the share that has not reached the target after so many steps
+#' @param failed Which runs will never reach it, however many steps they get.
 #' @return A data frame with a row for 0 steps and for each number at which a run ended: `steps`,
 #'   `survival`, and the interval `lower` and `upper`, `NA` if all or none are left.
 #' @noRd
-kaplan_meier <- function(steps, reached, level) {
+kaplan_meier <- function(steps, reached, failed, level) {
   at <- sort(unique(steps))
-  left <- vapply(at, function(t) sum(steps >= t), 0)
+  left <- vapply(at, function(t) sum(steps >= t | failed), 0)
   ended <- vapply(at, function(t) sum(reached & steps == t), 0)
   survival <- cumprod(1 - ended / left)
   variance <- cumsum(ended / (left * (left - ended)))

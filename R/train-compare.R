@@ -29,9 +29,10 @@
 #'
 #' Trainings that stop at a target all score about that target. They are compared by the steps that
 #' they needed to reach it. A run whose final evaluation reached it needed all of its steps. A run
-#' that did not reach it is censored: it needs more steps than it had. The share of runs that have
-#' reached the target after so many steps is estimated as in Kaplan and Meier (1958), with
-#' Greenwood's variance on the scale of log(-log).
+#' whose final evaluation did not reach it has failed: it never reaches the target. An interrupted
+#' run is censored: it needs more steps than it had. The share of runs that have reached the target
+#' after so many steps is estimated as in Kaplan and Meier (1958), with Greenwood's variance on the
+#' scale of log(-log).
 #'
 #' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
 #'   one agent in several environments have the same name. Or one data frame as returned by
@@ -42,8 +43,9 @@
 #'   `high`, which also normalises scores in one environment.
 #' @param reps The number of bootstrap samples, a whole number of at least 1.
 #' @param level The confidence level of the intervals, a number between 0 and 1.
-#' @param seed A whole number that fixes the bootstrap. `NULL`, the default, draws from the
-#'   session's generator.
+#' @param seed A whole number that fixes the bootstrap. `NULL`, the default, draws one from the
+#'   session's generator: the bounds of the intervals then differ a little from call to call, unless
+#'   [set.seed()] comes before. `print()` shows the seed that repeats them.
 #' @param x A comparison.
 #' @param row.names,optional Not used.
 #' @return An object of class `gym_comparison`, a list with the elements
@@ -55,7 +57,7 @@
 #'       environment: `training`, `env_id`, `runs`, `reached` (the number of runs, an integer),
 #'       `median`, `lower`, `upper` (steps, `NA` if fewer than half have reached the target).}
 #'     \item{runs}{A data frame with a row for each run: `training`, `env_id`, `seed`, `steps`, and
-#'       `score`, or `reached` (a logical).}
+#'       `score`, or `reached` and `interrupted` (logicals).}
 #'     \item{improvement}{For scores, a data frame with a row for each pair: `training`, `than`,
 #'       `probability`, `lower`, `upper`.}
 #'     \item{profile}{A data frame of the curves that [plot()][plot.gym_comparison()] shows:
@@ -282,7 +284,12 @@ comparison_lines <- function(x, pairs = TRUE) {
     utils::capture.output(print(shown)),
     paste0(
       percent_text(x$level), " intervals: ",
-      if (scores) paste0("stratified bootstrap, ", count_of(x$reps, "draw")) else "Kaplan-Meier"
+      if (scores) {
+        paste0("stratified bootstrap, ", count_of(x$reps, "draw"), ", repeated by `seed = ",
+               format(x$seed, scientific = FALSE), "`")
+      } else {
+        "Kaplan-Meier"
+      }
     ),
     if (pairs) improvement_lines(x$improvement, interval),
     paste0("Note: ", x$notes, recycle0 = TRUE)

@@ -188,7 +188,11 @@ print.gym_landscape <- function(x, ...) {
       paste0("Networks that reach the target of ", number_text(x$target), ": ",
              percent_text(mean(played >= x$target)))
     },
-    paste0(if (x$interrupted) "Interrupted after " else "Played in ", seconds_text(x$elapsed)),
+    if (x$interrupted) {
+      paste0("Interrupted", elapsed_text(x$elapsed, " after "))
+    } else {
+      elapsed_text(x$elapsed, "Played in ")
+    },
     sep = "\n"
   )
   invisible(x)

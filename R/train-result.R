@@ -12,7 +12,9 @@ training_result <- function(settings, state, interrupted = FALSE) {
         # A search has not found a policy that was never played.
         policy = if (!search || state$iteration > 0L) judged_policy(settings, state$agent),
         agent = state$agent,
-        solved = state$solved,
+        # By the tutorial's rule there is no final evaluation.
+        solved = if (search) state$solved else reaches(state$final$mean_return, settings$target),
+        stopped_early = state$solved,
         history = history,
         evaluations = rows_table(state$evaluations, no_evaluations),
         final = state$final,
@@ -81,7 +83,13 @@ print.gym_training <- function(x, ...) {
 
 training_lines <- function(x) {
   search <- inherits(x, "gym_search")
-  outcome <- if (x$interrupted) "Interrupted after" else if (x$solved) "Solved after" else "Played"
+  outcome <- if (x$interrupted) {
+    "Interrupted after"
+  } else if (x$stopped_early) {
+    if (search) "Solved after" else "Stopped early after"
+  } else {
+    "Played"
+  }
   target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
   c(
     paste0("Training in ", wrapped_id(x$env_id, x$provenance$wrappers), " by ",
@@ -89,16 +97,23 @@ training_lines <- function(x) {
     paste0("Policy: ", policy_text(x$policy %||% x$template)),
     paste0(
       outcome, " ", count_of(nrow(x$history), if (search) "round" else "iteration"), ", ",
-      count_of(x$steps, "step"), " in ", seconds_text(x$elapsed), target
+      count_of(x$steps, "step"), elapsed_text(x$elapsed), target
     ),
     if (search) best_round_line(x),
     if (is_exact(x$final)) {
-      paste("Expected return, by the model:", number_text(x$final$mean_return))
+      paste0("Expected return, by the model: ", number_text(x$final$mean_return), verdict_text(x))
     } else if (!is.null(x$final)) {
       paste0("Mean return in ", count_of(x$final$episodes, "fresh episode"), ": ",
-             evaluation_text(x$final))
+             evaluation_text(x$final), verdict_text(x))
     }
   )
+}
+
+# What the final evaluation says of the target.
+verdict_text <- function(x) {
+  if (is.finite(x$target %||% Inf)) {
+    paste0(", target ", if (x$solved) "reached" else "not reached")
+  }
 }
 
 # Was it evaluated exactly, without playing an episode?
@@ -158,7 +173,9 @@ print.summary.gym_training <- function(x, ...) {
       paste0("Stopping evaluation", several, ": ",
              evaluation_text(stopping[nrow(stopping), ]))
     },
-    if (!is.null(training$final)) paste0("Final evaluation: ", evaluation_text(training$final)),
+    if (!is.null(training$final)) {
+      paste0("Final evaluation: ", evaluation_text(training$final), verdict_text(training))
+    },
     sep = "\n"
   )
   invisible(x)

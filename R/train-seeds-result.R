@@ -3,10 +3,11 @@
 #' One training says little about an agent: another seed may fail. `train_agent(seeds = )` trains
 #' once with each of many seeds and returns all trainings, failures included.
 #'
-#' A training is `solved` if an evaluation during training reached the target. At that time the
-#' policy was also lucky. The final evaluations, of episodes that no training has seen, are
-#' therefore the better measure: `reached` says whether the final mean return has reached the
-#' target. The interval of this share is Wilson's, which also works if all or none have reached it.
+#' A training has `reached` the target if its final evaluation has, which plays episodes that no
+#' training has seen. The interval of this share is Wilson's, which also works if all or none have
+#' reached it. A training has `stopped_early` if an evaluation during training reached the target.
+#' At that time the policy was also lucky, so its final evaluation may miss the target. A training
+#' that used up its budget may have reached it.
 #'
 #' @param x,object Trainings, as returned by `train_agent(seeds = )`.
 #' @param row.names,optional,... Not used.
@@ -21,18 +22,17 @@
 #'       ended early.}
 #'     \item{provenance}{The result of [provenance()], with all seeds.}
 #'   }
-#'   `as.data.frame()` returns a row for each seed: `seed` (whole number), `solved` (logical: did an
-#'   evaluation during training reach the target?), `iterations` (integer), `steps` (double),
-#'   `mean_return`, `se`, `lower`, `upper` (of the final evaluation, doubles), `reached` (logical:
-#'   has this mean return reached the target?), `elapsed` (seconds, a double), `interrupted`
-#'   (logical).
+#'   `as.data.frame()` returns a row for each seed: `seed` (whole number), `stopped_early`
+#'   (logical), `iterations` (integer), `steps` (double), `mean_return`, `se`, `lower`, `upper` (of
+#'   the final evaluation, doubles), `reached` (logical: has this mean return, or a round by the
+#'   tutorial's rule, reached the target?), `elapsed` (seconds, a double), `interrupted` (logical).
 #'
 #'   `coef()` returns the weights of the policies, a matrix with a row for each seed.
 #'
 #'   `summary()` returns an object of class `summary.gym_trainings`, a list of `trainings`,
-#'   `finished`, `solved` and `reached` (their numbers, integers), `lower` and `upper` (the 95%
-#'   interval of the share that reaches the target, doubles), `returns` and `steps` (quartiles and
-#'   mean of the final mean returns and of the steps of the training, named numeric vectors of
+#'   `finished`, `stopped_early` and `reached` (their numbers, integers), `lower` and `upper` (the
+#'   95% interval of the share that reaches the target, doubles), `returns` and `steps` (quartiles
+#'   and mean of the final mean returns and of the steps of the training, named numeric vectors of
 #'   length 6).
 #' @references E. B. Wilson (1927), Probable inference, the law of succession, and statistical
 #'   inference, Journal of the American Statistical Association 22, 209-212.
@@ -66,14 +66,13 @@ as.data.frame.gym_trainings <- function(x, row.names = NULL, optional = FALSE, .
   final <- function(training, name) as.numeric(training$final[[name]] %||% NA_real_)
   column <- function(f, type) unname(vapply(x$trainings, f, type))
   of_final <- function(name) column(function(training) final(training, name), 0)
-  mean_return <- of_final("mean_return")
   data.frame(
     seed = narrow_whole(column(function(training) as.numeric(training$seed), 0)),
-    solved = column(function(training) training$solved, NA),
+    stopped_early = column(function(training) training$stopped_early, NA),
     iterations = column(function(training) NROW(training$history), 0L),
     steps = column(function(training) training$steps, 0),
-    mean_return = mean_return, se = of_final("se"), lower = of_final("lower"),
-    upper = of_final("upper"), reached = vapply(mean_return, reaches, NA, target = x$target),
+    mean_return = of_final("mean_return"), se = of_final("se"), lower = of_final("lower"),
+    upper = of_final("upper"), reached = column(function(training) training$solved, NA),
     elapsed = column(function(training) training$elapsed, 0),
     interrupted = column(function(training) training$interrupted, NA)
   )
@@ -94,7 +93,7 @@ summary.gym_trainings <- function(object, ...) {
   interval <- wilson_interval(sum(done$reached), nrow(done))
   structure(
     list(
-      trainings = object, finished = nrow(done), solved = sum(done$solved),
+      trainings = object, finished = nrow(done), stopped_early = sum(done$stopped_early),
       reached = sum(done$reached), lower = interval[[1L]], upper = interval[[2L]],
       returns = quartiles(done$mean_return), steps = quartiles(done$steps)
     ),
@@ -129,31 +128,32 @@ trainings_lines <- function(x) {
   }
   done <- table[!table$interrupted, ]
   returns <- done$mean_return[!is.na(done$mean_return)]
-  # With `target = Inf` nothing can be solved.
+  # With `target = Inf` there is nothing to reach.
   has_target <- !is.null(x$target) && is.finite(x$target)
   c(
     paste0("Training in ", wrapped_id(x$env_id, x$trainings[[1L]]$provenance$wrappers), " by ",
            format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
-    if (nrow(done) && has_target) {
-      paste0("Solved with ", sum(done$solved), " of ", count_of(nrow(done), "seed"), " (target ",
-             number_text(x$target), ")")
-    },
-    if (length(returns) && has_target) reached_line(done$reached),
+    if (nrow(done) && has_target) reached_lines(done, x$target),
     if (length(returns)) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))
     },
     paste0(if (any(table$interrupted)) "Interrupted after " else "Played ",
-           count_of(nrow(done), "seed"), ", ", count_of(sum(table$steps), "step"), " in ",
-           seconds_text(x$elapsed))
+           count_of(nrow(done), "seed"), ", ", count_of(sum(table$steps), "step"),
+           elapsed_text(x$elapsed))
   )
 }
 
-reached_line <- function(reached) {
-  interval <- wilson_interval(sum(reached), length(reached))
-  paste0("Final evaluations that reach the target: ", sum(reached), " of ", length(reached),
-         " (", interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")")
+reached_lines <- function(done, target) {
+  n <- nrow(done)
+  interval <- wilson_interval(sum(done$reached), n)
+  c(
+    paste0("Reached the target ", number_text(target), " with ", sum(done$reached), " of ",
+           count_of(n, "seed"), " (",
+           interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")"),
+    paste0("Stopped early: ", sum(done$stopped_early), " of ", n)
+  )
 }
 
 #' @export

@@ -27,15 +27,17 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   if (kept > 0L) {
     inform_resumed("Going on from the files of {kept} of {length(seeds)} seed{?s}.")
   }
-  show <- progress_bar(length(seeds), "Seed", "0 solved, ", shown = progress)
+  show <- progress_bar(length(seeds), "Seed", "0 reached the target, ", shown = progress)
   trainings <- list()
   result <- function(interrupted = FALSE) {
     new_trainings(trainings, settings, proc.time()[["elapsed"]] - started, interrupted)
   }
   keep <- function(training) {
     trainings[[length(trainings) + 1L]] <<- training
-    solved <- sum(vapply(trainings, function(training) training$solved, NA))
-    if (!training$interrupted) show(length(trainings), paste0(solved, " solved, "))
+    reached <- sum(vapply(trainings, function(training) training$solved, NA))
+    if (!training$interrupted) {
+      show(length(trainings), paste0(reached, " reached the target, "))
+    }
   }
   train_all <- function(vector_env) {
     if (settings$search) check_has_target(settings, vector_env, call)

@@ -36,6 +36,13 @@ seconds_text <- function(seconds) {
   }
 }
 
+# The time that a result took, for its print(), unless the user leaves times out.
+elapsed_text <- function(seconds, before = " in ") {
+  if (prints_times()) paste0(before, seconds_text(seconds))
+}
+
+prints_times <- function() !isFALSE(getOption("gym.print_seconds"))
+
 # A name without the characters that people confuse.
 plain_name <- function(x) gsub("[._]", "", lower_case(x))
 

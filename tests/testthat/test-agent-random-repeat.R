@@ -137,7 +137,7 @@ test_that("a progress bar is shown when asked for and nothing is said otherwise"
     ),
     type = "message"
   )
-  expect_match(paste(shown, collapse = " "), "Seed [0-9]+ of 40 .*0 solved")
+  expect_match(paste(shown, collapse = " "), "Seed [0-9]+ of 40 .*0 reached the target")
 })
 
 test_that("CartPole: each seed's row is the search with that seed, and nothing stays open", {

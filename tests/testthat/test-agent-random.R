@@ -103,8 +103,8 @@ test_that("many searches are trainings, too, and each says whether it was solved
   trained <- train_agent(agent_random(), env, policy_network(), iterations = 4, episodes = 3,
                          target = 11, seeds = 1:4, solved_by = "candidate")
   searches <- search_repeat(env, rounds = 4, episodes = 3, target = 11, seeds = 1:4)
-  expect_identical(as.data.frame(trained)$solved, as.data.frame(searches)$solved)
-  expect_output(print(trained), "Solved with [0-9] of 4 seeds")
+  expect_identical(as.data.frame(trained)$reached, as.data.frame(searches)$solved)
+  expect_output(print(trained), "Reached the target 11 with [0-9] of 4 seeds")
 })
 
 test_that("set.seed() alone fixes a search, whose seed gives it again and moves no generator", {

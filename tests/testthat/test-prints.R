@@ -166,3 +166,25 @@ test_that("what check_env() finds", {
   expect_printed(check_env(walk(NA, TRUE)))
   expect_printed(check_env(walk(1, FALSE), max_steps = 20))
 })
+
+test_that("results are printed without times if the user leaves them out", {
+  env <- fake_environment(reward = first_action)
+  trained <- train_agent(agent_ars(3, 2), env, iterations = 1, seeds = 1:2, target = Inf,
+                         eval_episodes = 2)
+  searches <- search_repeat(env, rounds = 2, target = 9, seeds = 1:2)
+  search <- search_random(env, rounds = 2, target = 9, seed = 1)
+  landscape <- search_landscape(search, size = 3, episodes = 1)
+  results <- list(
+    trained, trained$trainings[[1]], summary(trained), summary(trained$trainings[[1]]), searches,
+    summary(searches), search, summary(search, episodes = 2, seed = 1), landscape,
+    provenance(trained), provenance(trained$trainings[[1]])
+  )
+  times <- "[0-9] (s|min)\\b|[0-9]:[0-9]|elapsed"
+  for (result in results) {
+    expect_match(capture.output(print(result)), times, all = FALSE)
+    withr::with_options(
+      list(gym.print_seconds = FALSE),
+      expect_no_match(capture.output(print(result)), times)
+    )
+  }
+})

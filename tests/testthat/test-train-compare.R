@@ -1,7 +1,7 @@
 # Trainings as they would be, each with a final evaluation after `steps`.
-trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, solved = FALSE,
+trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, interrupted = FALSE,
                            total_steps = 100, curve = NULL) {
-  trainings <- Map(function(score, steps, solved, seed) {
+  trainings <- Map(function(score, steps, interrupted, seed) {
     structure(
       list(
         history = data.frame(steps = c(steps / 2, steps)),
@@ -10,12 +10,13 @@ trainings_with <- function(scores, env_id = "A", target = Inf, steps = 100, solv
           mean_return = c(0, curve %||% score, score), se = 0, lower = 0, upper = 0, episodes = 9L
         ),
         agent = agent_ars(), target = target, env_id = env_id, seed = seed, steps = steps,
-        solved = solved, final = data.frame(mean_return = score), interrupted = FALSE,
+        solved = !interrupted && score >= target, final = data.frame(mean_return = score),
+        interrupted = interrupted,
         rules = list(total_steps = total_steps)
       ),
       class = "gym_training"
     )
-  }, scores, steps, solved, seq_along(scores))
+  }, scores, steps, interrupted, seq_along(scores))
   structure(
     list(trainings = trainings, agent = agent_ars(), env_id = env_id, target = target),
     class = "gym_trainings"
@@ -84,6 +85,11 @@ test_that("a comparison has a table and prints, and a seed fixes it", {
   expect_identical(.Random.seed, state)
   expect_output(print(compared), "Scores in A at a budget of 100 steps, 5 seeds each", fixed = TRUE)
   expect_output(print(compared), "Steps taken: a 100; b 100", fixed = TRUE)
+  expect_output(print(compared), "stratified bootstrap, 2,000 draws, repeated by `seed = 7`",
+                fixed = TRUE)
+  drawn <- compare_trainings(a, b)
+  expect_output(print(drawn), paste0("`seed = ", drawn$seed, "`"), fixed = TRUE)
+  expect_identical(compare_trainings(a, b, seed = drawn$seed)$table, drawn$table)
   expect_output(print(compared), "Probability that a scores higher than b: 1 [1, 1]", fixed = TRUE)
   expect_length(compared$notes, 0)
 })
@@ -176,30 +182,47 @@ test_that("scores of several environments are between random policy and threshol
                class = "gym_error_argument")
 })
 
-test_that("trainings that stop at a target are compared by steps, failures censored", {
-  quick <- trainings_with(c(9, 9, 9, 5, 9, 5), target = 9, steps = c(10, 20, 30, 30, 50, 60),
-                          solved = c(TRUE, TRUE, TRUE, FALSE, TRUE, FALSE))
-  slow <- trainings_with(c(9, rep(5, 5)), target = 9, steps = c(40, 60, 60, 60, 60, 60),
-                         solved = c(TRUE, rep(FALSE, 5)))
+test_that("trainings that stop at a target are compared by steps", {
+  quick <- trainings_with(c(9, 9, 9, 5, 9, 5), target = 9, steps = c(10, 20, 30, 30, 50, 60))
+  slow <- trainings_with(c(9, rep(5, 5)), target = 9, steps = c(40, 60, 60, 60, 60, 60))
   compared <- compare_trainings(quick, slow)
   expect_identical(compared$by, "steps")
   expect_identical(compared$table$reached, c(4L, 1L))
   expect_identical(compared$table$median, c(30, NA))
-  curve <- kaplan_meier(c(10, 20, 30, 30, 50, 60), c(TRUE, TRUE, TRUE, FALSE, TRUE, FALSE), 0.95)
-  expect_equal(curve$survival, c(1, 5 / 6, 4 / 6, 3 / 6, 1 / 4, 1 / 4))
   expect_output(print(compared), "Steps to the target in A, 6 seeds each", fixed = TRUE)
   expect_output(print(compared), "4 of 6")
   inf <- trainings_with(1:5)
   expect_error(compare_trainings(quick, inf), "target = Inf", class = "gym_error_argument")
-  other <- trainings_with(rep(9, 6), target = 8, steps = 10, solved = TRUE)
+  other <- trainings_with(rep(9, 6), target = 8, steps = 10)
   expect_match(compare_trainings(quick, other)$notes, "targets differ: quick: 9; other: 8",
                all = FALSE)
 })
 
-test_that("a run whose final evaluation reaches the target has reached it", {
-  late <- trainings_with(c(9, 9, 8), target = 9, steps = c(10, 20, 30), solved = rep(FALSE, 3))
-  compared <- suppressWarnings(compare_trainings(late), classes = "gym_warning_seeds")
-  expect_identical(compared$runs$reached, c(TRUE, TRUE, FALSE))
+test_that("a run that failed counts as one that never reaches the target, wherever it ended", {
+  share_at_the_end <- function(steps, ...) {
+    trained <- trainings_with(c(9, 9, 9, 5, 9, 9), target = 9, steps = steps, ...)
+    compared <- compare_trainings(trained)
+    expect_identical(compared$table$reached, 5L)
+    line <- layers_of(drawn(ggplot2::autoplot(compared)), "GeomPath")[[1]]
+    expect_identical(line$y, sort(line$y))
+    max(line$y)
+  }
+  # The last runs overshoot the budget, so that the one that failed has fewer steps.
+  expect_equal(share_at_the_end(c(10, 20, 30, 50, 55, 60)), 5 / 6)
+  expect_equal(share_at_the_end(c(10, 20, 30, 70, 55, 60)), 5 / 6)
+  # An interrupted run has not failed.
+  expect_equal(share_at_the_end(c(10, 20, 30, 50, 55, 60), interrupted = 1:6 == 4), 1)
+})
+
+test_that("a run whose last stopping evaluation was lucky has not reached the target", {
+  skip_unless_all()
+  # The final evaluation has the seeds above this.
+  lucky <- function(seed, step, action) if (seed <= 2^30 + 2^29) 10 else 1
+  trained <- train_agent(agent_hill_climb(), fake_environment(reward = lucky), iterations = 2,
+                         seeds = 1:5, target = 20, eval_episodes = 4)
+  compared <- compare_trainings(trained)
+  expect_identical(compared$table$reached, 0L)
+  expect_identical(compared$table$reached, summary(trained)$reached)
 })
 
 test_that("what is no training is named, with what it was meant to be", {
@@ -225,7 +248,7 @@ test_that("many pairs are not printed", {
 test_that("the estimate of Kaplan and Meier is that of package survival", {
   steps <- c(3, 5, 5, 8, 8, 10, 12, 12, 15, 20)
   reached <- c(1, 1, 0, 1, 1, 0, 1, 0, 1, 0) == 1
-  own <- kaplan_meier(steps, reached, 0.9)
+  own <- kaplan_meier(steps, reached, FALSE, 0.9)
   # survfit(Surv(steps, reached) ~ 1, conf.type = "log-log", conf.int = 0.9), survival 3.5-3
   expect_equal(own$steps, c(0, 3, 5, 8, 10, 12, 15, 20))
   expect_equal(own$survival[-1], c(0.9, 0.8, 0.571428571, 0.571428571, 0.428571429, 0.214285714,

@@ -21,7 +21,7 @@ test_that("the training of each seed is the one that the seed makes alone", {
   expect_identical(rownames(weights), c("5", "2", "100000"))
   expect_identical(weights["2", ], coef(trained$trainings[["2"]]))
   # Without a target there is nothing to reach.
-  expect_false(any(grepl("target|Solved", capture.output(print(trained)))))
+  expect_false(any(grepl("target|early", capture.output(print(trained)))))
 })
 
 test_that("a row for each seed says whether its final evaluation has reached the target", {
@@ -35,15 +35,23 @@ test_that("a row for each seed says whether its final evaluation has reached the
   expect_identical(table$mean_return, rep(3, 3))
   expect_identical(table$reached, rep(FALSE, 3))
   # Their stopping evaluations were lucky.
-  expect_identical(table$solved, rep(TRUE, 3))
-  expect_output(print(trained), "Solved with 3 of 3 seeds (target 20)", fixed = TRUE)
-  expect_output(print(trained), "reach the target: 0 of 3 (95% interval from 0% to 56%)",
-                fixed = TRUE)
-  expect_identical(summary(trained)[c("solved", "reached")], list(solved = 3L, reached = 0L))
+  expect_identical(table$stopped_early, rep(TRUE, 3))
+  shown <- capture.output(print(trained))
+  expect_match(shown, "Reached the target 20 with 0 of 3 seeds (95% interval from 0% to 56%)",
+               fixed = TRUE, all = FALSE)
+  expect_match(shown, "Stopped early: 3 of 3", fixed = TRUE, all = FALSE)
+  expect_false(any(grepl("olved", shown)))
+  expect_identical(summary(trained)[c("stopped_early", "reached")],
+                   list(stopped_early = 3L, reached = 0L))
   expect_output(print(summary(trained)), "mean return +3")
-  # Without a target none is solved, and none failed.
-  expect_false(any(grepl("Solved", capture.output(print(quiet_trainings())))) &&
-                 is.null(quiet_trainings()$target))
+  # A single training says the same.
+  one <- trained$trainings[[1]]
+  expect_identical(one[c("solved", "stopped_early")], list(solved = FALSE, stopped_early = TRUE))
+  shown <- capture.output(print(one), print(summary(one)))
+  expect_match(shown, "Stopped early after 1 iteration", fixed = TRUE, all = FALSE)
+  expect_length(grep(", target not reached", shown, fixed = TRUE), 2)
+  # Without a target there is nothing to reach.
+  expect_false(any(grepl("target|early", capture.output(print(quiet_trainings())))))
 })
 
 test_that("the interval of a share is Wilson's", {

@@ -39,7 +39,7 @@ reported <- cbind(
   data.frame(
     agent = format(training$agent), policy = format(training$policy),
     origin = from$preset$origin, train_target = training$target, seed = training$seed,
-    reached = final$mean_return >= job$target, solved = training$solved,
+    reached = final$mean_return >= job$target, stopped_early = training$stopped_early,
     iterations = nrow(training$history), steps = training$steps,
     eval_steps = sum(training$evaluations$steps),
     final[c("mean_return", "se", "lower", "upper", "episodes")], drawn_return = drawn_return,
