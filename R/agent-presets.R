@@ -91,6 +91,7 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 #' @param ... Further arguments of [train_agent()] and of the environment.
 #' @noRd
 make_and_train <- function(make, frame, ...) {
+  match_whole_names(frame)
   check_no_steps(...names(), frame)
   given <- lapply(rlang::set_names(ls(frame)), function(name) eval(as.name(name), frame))
   env <- given$env

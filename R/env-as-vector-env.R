@@ -84,6 +84,7 @@ as_vector_env <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALS
 #' @export
 as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, frames = FALSE,
                                     client = gym_client(), num_workers = NULL) {
+  match_whole_names()
   check_environment(x)
   check_one_framed(num_envs, frames)
   check_count(num_workers, min = 0, allow_null = TRUE)
@@ -97,7 +98,7 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_client(client, call = call)
   make <- function(num_envs, ...) {
     rlang::exec(
-      make_unseeded, x, !!!arguments, num_envs = num_envs, ..., client = client, call = call
+      make_unseeded, env_id = x, !!!arguments, num_envs = num_envs, ..., client = client, call = call
     )
   }
   single <- frames || length(remembering(wrapper_names(noted_wrappers(x))))

@@ -49,6 +49,7 @@
 #' )
 #' check_env(walk)
 check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client()) {
+  match_whole_names()
   check_count(max_steps)
   check_seed(seed, min = 0)
   id <- env

@@ -40,14 +40,14 @@
 #'   and `info` (a list).
 #' @param observation_space,action_space The spaces, such as `space_box(-1, 1, shape = 2)` and
 #'   `space_discrete(3)`.
+#' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
+#'   `self$size`. In a vectorised environment `num_envs` is the number of sub-environments of this
+#'   object, 256 by default.
 #' @param render A function of `self` that draws the environment. It plots with R's graphics, or
 #'   returns a picture: a raster image, a matrix of greys or of colours, or an array of height x
 #'   width x 3. `NULL`, the default, for an environment that cannot be drawn.
 #' @param vectorized Do the functions play all sub-environments at once? `FALSE`, the default, or
 #'   `TRUE`.
-#' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
-#'   `self$size`. In a vectorised environment `num_envs` is the number of sub-environments of this
-#'   object, 256 by default.
 #' @param model The environment's [model][gym_model()], for [env_model()]; the table of its
 #'   transitions; or a function of the environment that returns one of them. `NULL`, the default,
 #'   for none. If you give a table, `reset` determines where episodes start: exactly if it is not
@@ -100,9 +100,10 @@
 #' str(corridor$step(1))
 #'
 #' rollout(corridor, policy_random(), episodes = 100, seed = 1)
-gym_env <- function(reset, step, observation_space, action_space, render = NULL,
-                    vectorized = FALSE, ..., model = NULL, id = "R-environment",
+gym_env <- function(reset, step, observation_space, action_space, ..., render = NULL,
+                    vectorized = FALSE, model = NULL, id = "R-environment",
                     max_episode_steps = NULL, reward_threshold = NULL, render_fps = NULL) {
+  match_whole_names()
   check_takes(reset, "self")
   check_takes(step, c("self", "action"))
   if (!is.null(render)) {

@@ -39,6 +39,7 @@
 #' rollout("Guess-v0", policy_random(), episodes = 100, seed = 1, choices = 2)
 #' gym_unregister("Guess-v0")
 gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_threshold = NULL) {
+  match_whole_names()
   if (!rlang::is_string(id) || !grepl("^[[:alnum:]_.:/-]+$", id)) {
     must <- "a string of letters, digits and `_.:/-`, such as \"Corridor-v0\""
     abort_argument(id, must, "id", rlang::current_env())

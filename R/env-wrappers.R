@@ -84,6 +84,7 @@
 #'   })
 #' rollout(fast, policy_random(), episodes = 10, seed = 1)
 gym_wrap <- function(env_id, wrapper, ...) {
+  match_whole_names()
   check_string(wrapper)
   kwargs <- list(...)
   calls_r <- wrapper %in% names(transforms)

@@ -21,6 +21,7 @@
 #' lake
 #' head(as.data.frame(lake))
 env_model <- function(env, ..., client = gym_client()) {
+  match_whole_names()
   if (inherits(env, "gym_model")) {
     check_dots_empty(...)
     return(env)

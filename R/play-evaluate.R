@@ -44,6 +44,7 @@ evaluate_policy.default <- function(env, policy, episodes = 100, seed = NULL, ..
                                     max_steps = NULL, num_envs = NULL, level = 0.95,
                                     progress = rlang::is_interactive(), client = gym_client(),
                                     num_workers = NULL) {
+  match_whole_names()
   check_level(level)
   played <- naming_own_call(rollout(
     env, policy, episodes, max_steps = max_steps, seed = seed, ..., num_envs = num_envs,

@@ -33,6 +33,7 @@
 gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = NULL, ...,
                           max_steps = NULL, num_envs = NULL, client = gym_client(),
                           num_workers = NULL) {
+  match_whole_names()
   call <- rlang::current_env()
   check_environment(env)
   check_count(episodes)
@@ -42,8 +43,9 @@ gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = N
   }
   seed <- seed %||% draw_seed()
   in_env <- function(episodes, play) {
-    with_vector_env(env, episodes, play, max_steps, ..., num_envs = num_envs,
-                    num_workers = num_workers, client = client, seed = seed, call = call)
+    with_vector_env(env = env, episodes = episodes, play = play, max_steps = max_steps, ...,
+                    num_envs = num_envs, num_workers = num_workers, client = client, seed = seed,
+                    call = call)
   }
   policy <- in_env(1, function(vector_env) policy_bind(policy, vector_env, call = call))
   played <- same_episodes(seed, as.integer(episodes), max_steps)

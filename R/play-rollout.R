@@ -160,6 +160,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
                     client = gym_client(), frames = FALSE, ..., num_envs = NULL,
                     next_observation = FALSE, progress = rlang::is_interactive(),
                     num_workers = NULL) {
+  match_whole_names()
   check_environment(env)
   policy <- check_policies(policy)
   check_count(episodes)
@@ -185,8 +186,9 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     )
   }
   with_vector_env(
-    env, candidates * episodes, play, max_steps, num_envs = num_envs, ..., frames = frames,
-    client = client, num_workers = num_workers, seed = seed
+    env = env, episodes = candidates * episodes, play = play, max_steps = max_steps,
+    num_envs = num_envs, ..., frames = frames, client = client, num_workers = num_workers,
+    seed = seed
   )
 }
 

@@ -177,6 +177,7 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
                         checkpoint = NULL, resume = TRUE, progress = rlang::is_interactive(),
                         num_envs = NULL, num_workers = NULL, model = TRUE,
                         client = gym_client()) {
+  match_whole_names()
   call <- rlang::current_env()
   check_agent(agent, call)
   force(env)
@@ -282,8 +283,8 @@ with_training_env <- function(settings, play, max_steps, client, call) {
   }
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    played, episodes, play_both, max_steps, !!!kwargs, num_envs = settings$num_envs,
-    num_workers = settings$num_workers, client = client, call = call
+    env = played, episodes = episodes, play = play_both, max_steps = max_steps, !!!kwargs,
+    num_envs = settings$num_envs, num_workers = settings$num_workers, client = client, call = call
   ))
 }
 

@@ -61,6 +61,7 @@
 #' plot(sweep)
 sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., folder = NULL,
                         progress = rlang::is_interactive(), client = gym_client()) {
+  match_whole_names()
   call <- rlang::current_env()
   check_sweep(agent, settings, seeds, report_seeds, folder, call)
   settings <- as.data.frame(settings)

@@ -129,6 +129,39 @@ check_dots_named <- function(dots, example, call = rlang::caller_env()) {
   check_unique_names(dots, "...", call)
 }
 
+#' Match the names of a call's arguments only whole
+#'
+#' R completes names of arguments before `...`: `learn_ppo("Pendulum-v1", g = 5)` would set `gamma`.
+#' A function whose `...` are arguments of an environment calls this first. If R has completed a
+#' name, the function is called again so that R cannot, and returns that result.
+#' @param frame The frame of the function.
+#' @noRd
+match_whole_names <- function(frame = parent.frame()) {
+  at <- Position(function(one) identical(one, frame), sys.frames(), right = TRUE)
+  f <- sys.function(at)
+  call <- sys.call(at)
+  from <- sys.frame(sys.parents()[[at]])
+  dots <- which(vapply(as.list(call), identical, NA, quote(...)))
+  if (length(dots)) {
+    names <- rlang::names2(eval(quote(substitute(list(...))), from))[-1L]
+    passed <- lapply(paste0("..", seq_along(names), recycle0 = TRUE), as.name)
+    call <- as.call(append(as.list(call)[-dots], stats::setNames(passed, names), dots - 1L))
+  }
+  known <- names(formals(f))
+  before <- known[seq_len(match("...", known) - 1L)]
+  given <- rlang::names2(call)
+  open <- setdiff(before, given)
+  completed <- nzchar(given) & !given %in% known &
+    vapply(given, function(name) any(startsWith(open, name)), NA)
+  if (any(completed)) {
+    whole <- as.list(match.call(f, call[!completed]))
+    # Given without a value they keep their defaults, and R matches no other name to them.
+    whole[setdiff(before, names(whole))] <- list(rlang::missing_arg())
+    again <- as.call(c(whole, as.list(call)[completed]))
+    rlang::eval_bare(bquote(return(eval(quote(.(again)), .(from)))), frame)
+  }
+}
+
 # For functions that have `...` only for their methods.
 check_dots_empty <- function(..., call = rlang::caller_env()) {
   if (...length()) {

@@ -102,3 +102,30 @@ test_that("a missing package is named", {
                class = "gym_error_argument")
   expect_silent(check_suggested("stats", "draw"))
 })
+
+test_that("the name of an environment's argument is never completed to another's", {
+  ends_after <- function(p = 9, s = 1, ...) {
+    gym_env(
+      function(self) self$taken <- 0,
+      function(self, action) {
+        self$taken <- self$taken + self$s
+        list(observation = 0, reward = 1, terminated = self$taken >= self$p)
+      },
+      space_box(0, 9, shape = 1), space_discrete(1), s = s, p = p, r = NULL, ...
+    )
+  }
+  length_of <- function(...) rollout(..., seed = 1)$episodes$length
+  expect_identical(length_of(ends_after(p = 4), policy_random()), 4L)
+  # By dots, by do.call(), registered, and through each function that passes names on.
+  expect_invisible(gym_register("Short-v0", ends_after, e = NULL, p = 3))
+  on.exit(gym_unregister("Short-v0"))
+  expect_identical(length_of("Short-v0", policy_random()), 3L)
+  expect_identical(length_of("Short-v0", policy_random(), p = 2, s = 1), 2L)
+  expect_identical(do.call(length_of, list("Short-v0", policy_random(), p = 2, f = 1)), 2L)
+  expect_identical(evaluate_policy("Short-v0", policy_random(), 2, 1, p = 2, f = 1)$steps, 4L)
+  expect_identical(attr(check_env("Short-v0", p = 2, e = 1), "lengths"), c(2L, 2L, 2L))
+  objective <- gym_objective("Short-v0", episodes = 1, seed = 1, p = 2)
+  expect_identical(objective(0), -2)
+  trained <- search_ars("Short-v0", p = 2, iterations = 1, seed = 1, progress = FALSE)
+  expect_identical(trained$evaluation$mean_return, 2)
+})
