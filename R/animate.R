@@ -4,7 +4,8 @@
 #' `frames = TRUE`; for a search, a training or a policy, a new episode is played. Printing the
 #' result in an interactive session opens it in RStudio's viewer or else in the browser
 #' (`options(gym.viewer = )` sets another function, or `FALSE`). A knitr document shows it on the
-#' page, or, with LaTeX, as a [filmstrip][plot.gym_rollout()].
+#' page, or, with LaTeX, as a [filmstrip][plot.gym_rollout()]. If the file has gone, as a temporary
+#' one has in another session, a GIF is drawn again from the stills.
 #'
 #' A GIF requires the package magick. An MP4 requires the package av, or the program ffmpeg, which
 #' the server's extra `"video"` includes (see [gym_server_install()]).
@@ -32,7 +33,7 @@
 #' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (the
 #'   number of steps before each frame, integers), `delays` (how long each is shown, in hundredths
 #'   of a second, integers; a second for the last), `size` (width and height in pixels) and
-#'   `stills`, the frames of a filmstrip.
+#'   `stills`, the frames of a filmstrip, at most 8.
 #' @section Errors: `gym_error_argument` for an invalid argument, a rollout without frames, an
 #'   environment that cannot be drawn, or if the software that writes the file is missing. Those of
 #'   [rollout()] while it plays.
@@ -232,11 +233,28 @@ move_animation <- function(written, file, call = rlang::caller_env(2)) {
 #' @export
 print.gym_animation <- function(x, ...) {
   cat(format(x), "\n", sep = "")
-  viewer <- check_viewer()
-  if (file.exists(x$file)) {
-    open_address(among_temporary_files(x$file), viewer)
+  if (!file.exists(x$file)) {
+    x <- redrawn_if_gone(x)
+    cat("  gone; its ", count_of(length(x$stills$steps), "still"), " are in ", x$file, "\n", sep = "")
   }
+  open_address(among_temporary_files(x$file), check_viewer())
   invisible(x)
+}
+
+# A temporary file ends with its session, but saveRDS() and knitr's cache keep the object.
+redrawn_if_gone <- function(x, call = rlang::caller_env()) {
+  if (file.exists(x$file)) {
+    return(x)
+  }
+  check_suggested("magick", "draw an animation again whose file has gone", call)
+  stills <- x$stills
+  # Each still is shown until the next one, and the last as long as before.
+  last <- x$delays[[length(x$delays)]]
+  share <- if (length(stills$steps) > 1L) stills$steps / max(stills$steps) else 0
+  delays <- c(diff(round(share * (sum(x$delays) - last))), last)
+  x$file <- temporary_file(fileext = ".gif")
+  write_gif(unclass(stills$frames), x$file, pmin(delays, 65535), x$size[[1L]])
+  x
 }
 
 # RStudio's viewer shows only files in the session's temporary directory.
@@ -266,7 +284,7 @@ format.gym_animation <- function(x, ...) {
 # gets a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {
-  hash <- substr(unname(tools::md5sum(x$file)), 1L, 8L)
+  hash <- substr(rlang::hash(unclass(x)[names(x) != "file"]), 1L, 8L)
   path <- function(ending) {
     path <- knitr::fig_path(paste0("-", hash, ending), options, number = NULL)
     dir.create(dirname(path), showWarnings = FALSE, recursive = TRUE)
@@ -278,6 +296,7 @@ knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...
     grDevices::pdf(shown, width = size[[1L]], height = size[[2L]])
     tryCatch(print(filmstrip(x$stills)), finally = grDevices::dev.off())
   } else {
+    x <- redrawn_if_gone(x)
     shown <- path(paste0(".", tools::file_ext(x$file)))
     file.copy(x$file, shown, overwrite = TRUE)
     if (is_mp4(x$file)) {

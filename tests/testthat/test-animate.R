@@ -183,8 +183,38 @@ test_that("it prints where it is, and opens where somebody looks", {
   withr::local_options(gym.viewer = FALSE)
   rlang::with_interactive(expect_output(print(animation), animation$file, fixed = TRUE))
   expect_null(seen)
+})
+
+knitted <- function(animation, to) {
+  folder <- withr::local_tempdir(.local_envir = parent.frame())
+  withr::local_dir(folder)
+  document <- new.env()
+  document$animation <- animation
+  old <- knitr::opts_knit$get("rmarkdown.pandoc.to")
+  knitr::opts_knit$set(rmarkdown.pandoc.to = to)
+  on.exit(knitr::opts_knit$set(rmarkdown.pandoc.to = old))
+  text <- knitr::knit(
+    text = c("```{r pole, out.width='50%'}", "animation", "animation", "```"), envir = document,
+    quiet = TRUE
+  )
+  list(text = text, files = file.path(folder, list.files(folder, recursive = TRUE)))
+}
+
+test_that("an animation whose file has gone is drawn again from its stills, and says so", {
+  skip_if_not_installed("magick")
+  saved <- withr::local_tempfile(fileext = ".rds")
+  animation <- animate(short_rollout(), width = 60)
+  saveRDS(animation, saved)
   unlink(animation$file)
-  expect_output(print(animation), animation$file, fixed = TRUE)
+  animation <- readRDS(saved)
+  expect_output(again <- print(animation), "gone; its 8 stills are in", fixed = TRUE)
+  read <- magick::image_info(magick::image_read(again$file))
+  expect_identical(read$width, rep(60L, 8))
+  skip_if_not_installed("knitr")
+  page <- knitted(animation, "html")
+  expect_identical(page$text, knitted(again, "html")$text)
+  expect_identical(tools::md5sum(page$files)[[1]], tools::md5sum(again$file)[[1]])
+  expect_match(knitted(animation, "latex")$files, "[.]pdf$")
 })
 
 test_that("it is printed also where it cannot be opened", {
@@ -216,21 +246,6 @@ test_that("only a file that is not temporary is copied for the viewer", {
   expect_identical(normalizePath(dirname(copy)), normalizePath(tempdir()))
   expect_identical(readLines(copy), "gif")
 })
-
-knitted <- function(animation, to) {
-  folder <- withr::local_tempdir(.local_envir = parent.frame())
-  withr::local_dir(folder)
-  document <- new.env()
-  document$animation <- animation
-  old <- knitr::opts_knit$get("rmarkdown.pandoc.to")
-  knitr::opts_knit$set(rmarkdown.pandoc.to = to)
-  on.exit(knitr::opts_knit$set(rmarkdown.pandoc.to = old))
-  text <- knitr::knit(
-    text = c("```{r pole, out.width='50%'}", "animation", "animation", "```"), envir = document,
-    quiet = TRUE
-  )
-  list(text = text, files = file.path(folder, list.files(folder, recursive = TRUE)))
-}
 
 test_that("a page of knitr has the animation, and LaTeX its filmstrip", {
   skip_if_not_installed("magick")
