@@ -1,6 +1,6 @@
 # make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
 
-.PHONY: help demo bench test test-all soak check lint coverage document site clean
+.PHONY: help demo pages bench test test-all soak check lint coverage document site clean
 .NOTPARALLEL:
 
 # R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
@@ -12,6 +12,7 @@ endif
 
 help:
 	@echo 'make demo      solve CartPole from R, print the result, draw it into pictures/'
+	@echo 'make pages     build the vignettes and install them with the package; two minutes'
 	@echo 'make bench     measure steps a second, and compare with reticulate, the classic client and'
 	@echo '               Python; half an hour. QUICK=1 is shorter, PARTS="wire" runs one part,'
 	@echo '               PARTS=gradients compares PPO with Stable-Baselines3 in some hours'
@@ -33,6 +34,8 @@ help:
 demo:
 	@tools/setup demo
 	@tools/in-env Rscript --no-init-file tools/demo.R
+
+pages:
 	@tools/setup pages
 	@tools/in-env Rscript --no-init-file tools/pages.R
 

@@ -26,7 +26,7 @@ install_pages <- function() {
 }
 
 if (!requireNamespace("rmarkdown", quietly = TRUE) || !rmarkdown::pandoc_available()) {
-  cat("\nTo have `make demo` build the vignettes, install pandoc, knitr and rmarkdown.\n")
+  cat("\nTo build the vignettes, install pandoc, knitr and rmarkdown.\n")
   quit()
 }
 if (changed()) {
