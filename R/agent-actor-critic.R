@@ -7,9 +7,10 @@
 #' turns them off.
 #'
 #' @inheritParams agent_sarsa
-#' @param learning_rate How far a value of the critic moves towards its target, a number from 0 to 1
-#'   or a function of the steps so far. The default is 0.1.
-#' @param actor_rate How far preferences move, given in the same way. The default is 0.1.
+#' @param learning_rate How far a value of the critic moves towards its target, a number above 0 and
+#'   at most 1, or a function of the steps so far. The default is 0.1.
+#' @param actor_rate How far preferences move, a number from 0 to 1 or a function of the steps so
+#'   far. The default is 0.1.
 #' @param lambda,actor_lambda How slowly the traces of the critic and of the actor fade, numbers
 #'   from 0 (the default) to 1.
 #' @param initial The first value of all states, a number. The default is 0. Preferences start at 0.

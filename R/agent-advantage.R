@@ -45,10 +45,15 @@ scale_rewards <- function(reward, last, gamma, moments) {
   list(reward = pmax(-10, pmin(reward / max(deviation, 1e-4), 10)), moments = moments)
 }
 
+# A single advantage has no standard deviation. Less its mean it would be 0 and teach nothing, so it
+# stays as it is, as in Stable-Baselines3.
 standardized <- function(x) {
   n <- length(x)
+  if (n < 2L) {
+    return(x)
+  }
   deviation <- x - sum(x) / n
-  if (n < 2L) deviation else deviation / (sqrt(sum(deviation * deviation) / (n - 1)) + 1e-8)
+  deviation / (sqrt(sum(deviation * deviation) / (n - 1)) + 1e-8)
 }
 
 explained_variance <- function(value, return) {

@@ -17,7 +17,8 @@
 #' | V2 | normalised | all |
 #' | V2-t | normalised | the `top` ones |
 #'
-#' A policy made with `normalize = TRUE` normalises observations in V1, too.
+#' A policy made with `normalize = TRUE` normalises observations in V1, too. It clips them at its
+#' `clip_obs`. Otherwise V2 does not clip them, as in the paper.
 #'
 #' As in the authors' code, there is no step if all returns used are equal, and an element of an
 #' observation that has not changed becomes 0. The authors' code keeps all directions with equal
@@ -80,7 +81,11 @@ agent_start.gym_agent_ars <- function(agent, policy) {
   agent <- NextMethod()
   if (startsWith(agent$version, "V2")) {
     check_can_normalize(agent, policy)
-    agent$policy$moments <- policy$moments %||% no_moments()
+    if (is.null(policy$moments)) {
+      agent$policy$moments <- no_moments()
+      # The paper's policy is linear in the normalised observations.
+      agent$policy$clip_obs <- Inf
+    }
   }
   agent
 }

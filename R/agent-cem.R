@@ -77,7 +77,10 @@ agent_tell.gym_agent_cem <- function(agent, results) {
   elite <- results$weights[best, , drop = FALSE]
   mean <- colMeans(elite)
   coef(agent$policy) <- mean
-  agent$deviation <- sqrt(colMeans((elite - rep(mean, each = agent$elite))^2))
+  # One candidate has no standard deviation. With 0 nothing would be tried any more.
+  if (agent$elite > 1L) {
+    agent$deviation <- sqrt(colMeans((elite - rep(mean, each = agent$elite))^2))
+  }
   agent$iteration <- agent$iteration + 1L
   agent
 }

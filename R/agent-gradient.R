@@ -147,7 +147,11 @@ scheduled_settings <- function(agent, names) {
 }
 
 check_scheduled <- function(settings, names, call = rlang::caller_env()) {
-  for (name in names) check_schedule(settings[[name]], name, 0, Inf, call)
+  for (name in names) {
+    rate <- endsWith(name, "learning_rate")
+    max <- if (rate) .Machine$double.xmax else Inf
+    check_schedule(settings[[name]], name, 0, max, call, above_zero = rate)
+  }
 }
 
 check_iteration <- function(batch_steps, min_episodes, call = rlang::caller_env()) {

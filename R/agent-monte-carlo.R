@@ -20,8 +20,8 @@
 #' @param visits Which visits of a state and action count: `"first"`, the default, for the first one
 #'   in each episode, or `"every"`.
 #' @param exploring_starts Draw the first action of each episode? `FALSE`, the default, or `TRUE`.
-#' @param learning_rate `NULL`, the default, for the plain mean of all returns. A number from 0 to
-#'   1, or a function of the steps so far, gives later returns more weight.
+#' @param learning_rate `NULL`, the default, for the plain mean of all returns. A number above 0
+#'   and at most 1, or a function of the steps so far, gives later returns more weight.
 #' @param importance `"none"`, the default, learns the values of the policy that plays, exploration
 #'   included. `"weighted"` and `"ordinary"` learn the values of a policy that does not explore from
 #'   episodes of one that does, by importance sampling (off-policy learning; sections 5.5 to 5.7).

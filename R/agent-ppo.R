@@ -45,7 +45,7 @@
 #' @param value_weight The weight of the squared error of values, a number. The default is 0.5.
 #' @param max_grad_norm The largest length of a gradient, a number or `Inf`. The default is 0.5.
 #' @param normalize_advantages Scale the advantages of a minibatch to mean 0 and standard deviation
-#'   1? `TRUE`, the default, or `FALSE`.
+#'   1? `TRUE`, the default, or `FALSE`. The advantage of a single step stays as it is.
 #' @param normalize_rewards Divide rewards by the running standard deviation of the discounted
 #'   return and clip them at 10? `FALSE`, the default, or `TRUE`. The log shows the original
 #'   rewards.

@@ -17,8 +17,8 @@
 #' without playing. The evaluations then have 0 episodes and a standard error of 0.
 #'
 #' @param discount The discount, a number above 0 and at most 1. The default is 0.99.
-#' @param learning_rate How far a value moves towards its target, a number from 0 to 1, or a
-#'   function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this
+#' @param learning_rate How far a value moves towards its target, a number above 0 and at most 1, or
+#'   a function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this
 #'   share for any number of tiles. With a function as `features` it moves by this share times the
 #'   sum of the squared features.
 #' @param epsilon The probability of exploring, a number from 0 to 1, or a function of the steps so

@@ -22,13 +22,14 @@
 #'   steps so far such as [schedule_linear()]. The default is 0.01.
 #' @param gamma The discount, a number from 0 to 1. The default is 0.99.
 #' @param baseline Use a baseline? `TRUE`, the default, or `FALSE`.
-#' @param value_learning_rate The step size of Adam for the baseline. The default is 0.01.
+#' @param value_learning_rate The step size of Adam for the baseline, as `learning_rate`. The default
+#'   is 0.01.
 #' @param value_updates The number of steps of Adam for the baseline after each iteration, a whole
 #'   number. The default is 20.
 #' @param entropy The weight of the policy's entropy relative to the return, a number or a function
 #'   of the steps so far. The default is 0.
 #' @param normalize_advantages Scale the factors of the log-probabilities to mean 0 and standard
-#'   deviation 1? `TRUE`, the default, or `FALSE`.
+#'   deviation 1? `TRUE`, the default, or `FALSE`. The factor of a single step stays as it is.
 #' @param max_grad_norm The largest length of a gradient, a number, or `Inf`, the default.
 #' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars

@@ -58,9 +58,12 @@ print.gym_schedule <- function(x, ...) {
 # Below this, a softmax takes the best action.
 lowest_temperature <- 1e-12
 
-check_schedule <- function(x, arg, min, max, call) {
-  if (!is.function(x) && !(is_number(x) && x >= min && x <= max)) {
-    must <- paste0("a number", range_text(min, max), ", or a function of the steps so far")
+check_schedule <- function(x, arg, min, max, call, above_zero = FALSE) {
+  if (!is.function(x) && !(is_number(x) && x >= min && x <= max && (x > 0 || !above_zero))) {
+    range <- range_text(min, max)
+    # A learner with a rate of 0 would learn nothing.
+    if (above_zero) range <- paste0(" above 0", if (max == 1) " and at most 1")
+    must <- paste0("a number", range, ", or a function of the steps so far")
     abort_argument(x, must, arg, call)
   }
 }

@@ -16,7 +16,7 @@ new_learner <- function(class, settings) {
 check_learner <- function(settings, call = rlang::caller_env()) {
   check_discount(settings$discount, "discount", call)
   for (name in intersect(c("learning_rate", "epsilon"), names(settings))) {
-    check_schedule(settings[[name]], name, 0, 1, call)
+    check_schedule(settings[[name]], name, 0, 1, call, above_zero = name == "learning_rate")
   }
   if (!is.null(settings$temperature)) {
     check_schedule(settings$temperature, "temperature", lowest_temperature, Inf, call)

@@ -29,20 +29,22 @@ policy_data <- function(policy, env) {
 # `weights` has a row for each candidate.
 network_data <- function(policy, weights) {
   of_layers <- sum(lengths(policy$weights))
+  normalizes <- !is.null(policy$moments$mean)
   list(
     document = c(
       list(
         kind = "network", sizes = as.list(policy$sizes), activation = as.list(policy$activation),
         bias = isTRUE(policy$bias), output = policy$output
       ),
-      if (policy$output == "epsilon-greedy") policy["epsilon"]
+      if (policy$output == "epsilon-greedy") policy["epsilon"],
+      if (normalizes && isTRUE(policy$clip_obs < Inf)) policy["clip_obs"]
     ),
     tensors = c(
       list(weights = unname(weights[, seq_len(of_layers), drop = FALSE])),
       if (is_gaussian(policy)) {
         list(deviation = unname(exp(weights[, -seq_len(of_layers), drop = FALSE])))
       },
-      if (!is.null(policy$moments$mean)) policy$moments[c("mean", "scale")]
+      if (normalizes) policy$moments[c("mean", "scale")]
     )
   )
 }

@@ -28,9 +28,10 @@
 #' policy_linear()
 #' follow <- policy_linear(weights = rbind(c(0, 0, 1, 1)))
 #' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
-policy_linear <- function(bias = FALSE, normalize = FALSE, weights = NULL) {
+policy_linear <- function(bias = FALSE, normalize = FALSE, weights = NULL, clip_obs = 10) {
   check_flag(bias)
   check_flag(normalize)
+  check_above_zero(clip_obs, max = Inf)
   sizes <- c(NA_integer_, NA_integer_)
   weights <- plain_numbers(weights)
   if (!is.null(weights)) {
@@ -41,6 +42,7 @@ policy_linear <- function(bias = FALSE, normalize = FALSE, weights = NULL) {
     check_weights(list(weights), sizes, bias)
   }
   policy <- new_network(as.integer(sizes), "identity", bias, normalize)
+  policy$clip_obs <- clip_obs
   policy["weights"] <- list(if (!is.null(weights)) list(weights))
   policy
 }

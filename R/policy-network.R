@@ -46,7 +46,9 @@
 #' its standard deviation, so that numbers of different size have the same influence. These moments
 #' are those of the observations in training and belong to the policy. A search updates them;
 #' playing and evaluating do not. Before the first update, observations are used as they are. A
-#' number that has never changed becomes 0.
+#' number that has never changed becomes 0. The result is clipped to the range from `-clip_obs` to
+#' `clip_obs`, as in
+#' [Stable-Baselines3](https://stable-baselines3.readthedocs.io/en/master/guide/vec_envs.html).
 #'
 #' @param sizes The numbers of inputs, of neurons in each hidden layer, and of outputs: whole
 #'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial: 4 x
@@ -63,6 +65,8 @@
 #' @param bias Does each neuron have a bias, a number added to its sum? `FALSE`, the default, or
 #'   `TRUE`.
 #' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`, see [policy_network()].
+#' @param clip_obs Where to clip normalised observations, a number above 0 or `Inf`. The default
+#'   is 10.
 #' @param output How the outputs determine an action, a string: `"greedy"`, the default,
 #'   `"softmax"`, `"gaussian"` or `"epsilon-greedy"`, see below. `NA` depends on the environment:
 #'   softmax for a Discrete action space, gaussian for a Box.
@@ -77,10 +81,10 @@
 #' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and [search_random()].
 #'   It is a list with the elements `sizes` (integers), `activation` (strings, one for each layer),
 #'   `weights` (a list of matrices), `bias` (a logical), `moments` (`NULL`, or a list of `count`,
-#'   `mean`, `squares` and `scale`, of the observations), `output` and `init` (strings), `log_std`
-#'   (numbers, which only `"gaussian"` uses), `epsilon` (a number), `observation_space`,
-#'   `action_space` (spaces) and `env_id` (the id of the environment, a string), all three `NULL`
-#'   until it is played.
+#'   `mean`, `squares` and `scale`, of the observations), `clip_obs` (a number), `output` and `init`
+#'   (strings), `log_std` (numbers, which only `"gaussian"` uses), `epsilon` (a number),
+#'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
+#'   string), all three `NULL` until it is played.
 #' @section Errors: `gym_error_argument` if sizes, activations and weights do not fit each other,
 #'   or, from [act()], if the observation does not have as many numbers as there are inputs.
 #' @references The network and the way its weights are drawn are those of the tutorial,
@@ -106,16 +110,18 @@
 #' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
 policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL, bias = FALSE,
                            normalize = FALSE, output = "greedy", log_std = 0, epsilon = 0.1,
-                           init = "uniform") {
+                           init = "uniform", clip_obs = 10) {
   sizes <- check_sizes(sizes)
   check_flag(bias)
   check_flag(normalize)
+  check_above_zero(clip_obs, max = Inf)
   output <- check_output(output)
   last <- if (identical(output, "greedy")) "logistic" else "identity"
   activation <- layer_activations(activation %||% c("tanh", last), sizes)
   check_draws_from_sums(output, activation)
   check_number(epsilon, min = 0, max = 1)
   policy <- new_network(sizes, activation, bias, normalize)
+  policy$clip_obs <- clip_obs
   policy$output <- output
   policy$log_std <- check_log_std(log_std)
   policy$epsilon <- epsilon
@@ -139,6 +145,7 @@ new_network <- function(sizes, activation, bias, normalize) {
       weights = NULL,
       bias = bias,
       moments = if (normalize) no_moments(),
+      clip_obs = 10,
       output = "greedy",
       log_std = 0,
       epsilon = 0,
@@ -296,7 +303,7 @@ network_inputs <- function(policy, values, call = rlang::caller_env()) {
     if (ncol(values) != policy$sizes[[1L]] || !is.numeric(values)) {
       abort_observation(policy, values, call)
     }
-    return(normalized(values, policy$moments))
+    return(normalized(values, policy$moments, policy$clip_obs))
   }
   at <- counted_from_one(as.vector(values), space$start, space$n, "observation", call)
   inputs <- matrix(0, nrow = nrow(values), ncol = space$n)

@@ -1,7 +1,7 @@
 # The file of a checkpoint. It is read and written completely or not at all.
 
 # The version of the file's format. Files with another version are refused.
-checkpoint_format <- 8L
+checkpoint_format <- 9L
 
 #' Read the file of a training
 #' @return The value written by [training_checkpoint()], `NULL` if there is no file.

@@ -239,6 +239,9 @@ candidate_results <- function(history, asked, call) {
   )
 }
 
+# With `target = Inf` training uses its whole budget.
+has_target <- function(x) !is.null(x$target) && is.finite(x$target)
+
 reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
 
 # A progress bar: a function that is called after each iteration. During a batch of rounds of a

@@ -12,8 +12,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
         # A search has not found a policy that was never played.
         policy = if (!search || state$iteration > 0L) judged_policy(settings, state$agent),
         agent = state$agent,
-        # By the tutorial's rule there is no final evaluation.
-        solved = if (search) state$solved else reaches(state$final$mean_return, settings$target),
+        solved = is_solved(settings, state),
         stopped_early = state$solved,
         history = history,
         evaluations = rows_table(state$evaluations, no_evaluations),
@@ -34,6 +33,17 @@ training_result <- function(settings, state, interrupted = FALSE) {
     ),
     class = c(if (search) "gym_search", "gym_training")
   )
+}
+
+is_solved <- function(settings, state) {
+  if (settings$search) {
+    # By the tutorial's rule there is no final evaluation.
+    state$solved
+  } else if (has_target(settings)) {
+    reaches(state$final$mean_return, settings$target)
+  } else {
+    NA
+  }
 }
 
 # Combines rows, lists or data frames, into a data frame; `none` is the one without rows.
@@ -111,7 +121,7 @@ training_lines <- function(x) {
 
 # What the final evaluation says of the target.
 verdict_text <- function(x) {
-  if (is.finite(x$target %||% Inf)) {
+  if (has_target(x)) {
     paste0(", target ", if (x$solved) "reached" else "not reached")
   }
 }

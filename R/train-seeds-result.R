@@ -25,7 +25,8 @@
 #'   `as.data.frame()` returns a row for each seed: `seed` (whole number), `stopped_early`
 #'   (logical), `iterations` (integer), `steps` (double), `mean_return`, `se`, `lower`, `upper` (of
 #'   the final evaluation, doubles), `reached` (logical: has this mean return, or a round by the
-#'   tutorial's rule, reached the target?), `elapsed` (seconds, a double), `interrupted` (logical).
+#'   tutorial's rule, reached the target? `NA` without a target, and with `target = Inf`),
+#'   `elapsed` (seconds, a double), `interrupted` (logical).
 #'
 #'   `coef()` returns the weights of the policies, a matrix with a row for each seed.
 #'
@@ -104,7 +105,7 @@ summary.gym_trainings <- function(object, ...) {
 #' Compute Wilson's score interval of a share
 #' @noRd
 wilson_interval <- function(successes, n, level = 0.95) {
-  if (n == 0) {
+  if (n == 0 || is.na(successes)) {
     return(c(NA_real_, NA_real_))
   }
   z <- stats::qnorm((1 + level) / 2)
@@ -128,13 +129,11 @@ trainings_lines <- function(x) {
   }
   done <- table[!table$interrupted, ]
   returns <- done$mean_return[!is.na(done$mean_return)]
-  # With `target = Inf` there is nothing to reach.
-  has_target <- !is.null(x$target) && is.finite(x$target)
   c(
     paste0("Training in ", wrapped_id(x$env_id, x$trainings[[1L]]$provenance$wrappers), " by ",
            format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
-    if (nrow(done) && has_target) reached_lines(done, x$target),
+    if (nrow(done) && has_target(x)) reached_lines(done, x$target),
     if (length(returns)) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))

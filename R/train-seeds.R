@@ -34,7 +34,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   }
   keep <- function(training) {
     trainings[[length(trainings) + 1L]] <<- training
-    reached <- sum(vapply(trainings, function(training) training$solved, NA))
+    reached <- sum(vapply(trainings, function(training) isTRUE(training$solved), NA))
     if (!training$interrupted) {
       show(length(trainings), paste0(reached, " reached the target, "))
     }

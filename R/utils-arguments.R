@@ -36,9 +36,10 @@ check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE,
   invisible(x)
 }
 
-check_above_zero <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (!is_number(x) || !is.finite(x) || x <= 0) {
-    abort_argument(x, "a number above 0", arg, call)
+check_above_zero <- function(x, max = .Machine$double.xmax, arg = rlang::caller_arg(x),
+                             call = rlang::caller_env()) {
+  if (!is_number(x) || x <= 0 || x > max) {
+    abort_argument(x, paste0("a number above 0", if (is.infinite(max)) ", or Inf"), arg, call)
   }
   invisible(x)
 }

@@ -47,13 +47,17 @@ merge_moments <- function(x, y) {
   )
 }
 
-# Before the first moments are known, returns the observations unchanged.
-normalized <- function(values, moments) {
+# Before the first moments are known, returns the observations unchanged. A number that hardly
+# changed in training may be many of its standard deviations away later; `clip` keeps it from
+# outweighing all others. It is NULL in policies saved by versions that did not clip.
+normalized <- function(values, moments, clip) {
   if (is.null(moments$mean)) {
     return(values)
   }
   n <- nrow(values)
-  (values - rep(moments$mean, each = n)) * rep(moments$scale, each = n)
+  values <- (values - rep(moments$mean, each = n)) * rep(moments$scale, each = n)
+  if (isTRUE(clip < Inf)) values[] <- pmin.int(pmax.int(values, -clip), clip)
+  values
 }
 
 reorder_moments <- function(moments, order) {

@@ -35,3 +35,23 @@ test_that("rewards are divided by the deviation of the discounted return so far,
   rare <- scale_rewards(c(rep(0, 999), 1e6), c(rep(FALSE, 999), TRUE), 0.5, NULL)
   expect_identical(max(rare$reward), 10)
 })
+
+test_that("a single advantage stays as it is, so that it teaches", {
+  expect_identical(standardized(-3), -3)
+  expect_equal(standardized(c(1, 2, 6)), (c(1, 2, 6) - 3) / (sd(c(1, 2, 6)) + 1e-8))
+  env <- gym_env(
+    function(self) 0,
+    function(self, action) list(observation = 0, reward = action, terminated = TRUE),
+    space_box(-1, 1, 1), space_discrete(2)
+  )
+  policy <- policy_network(c(NA, NA), "identity", bias = TRUE, output = NA, init = "orthogonal")
+  learned <- function(agent) {
+    trained <- suppressMessages(train_agent(
+      agent, env, policy, total_steps = 200, seed = 1, eval_episodes = 2, eval_episodes_curve = 0,
+      target = Inf
+    ))
+    trained$final$mean_return
+  }
+  expect_identical(learned(agent_ppo(20, batch = 1, learning_rate = 0.01)), 1)
+  expect_identical(learned(agent_reinforce(1, baseline = FALSE, min_episodes = 1)), 1)
+})

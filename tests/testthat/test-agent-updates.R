@@ -57,7 +57,7 @@ test_that("updates of augmented random search are those of NumPy, in each versio
       policy <- agent_policy(updates[[version]][[i]]$agent)
       wanted <- expected[[version]][[i]]
       expect_equal(coef(policy), wanted$weights, tolerance = 1e-12)
-      shown <- normalized(rbind(observation), policy$moments)
+      shown <- normalized(rbind(observation), policy$moments, policy$clip_obs)
       expect_equal(as.vector(shown), wanted$shown, tolerance = 1e-9)
       if (!is.null(wanted$count)) {
         expect_equal(policy$moments$count, wanted$count)
@@ -193,4 +193,11 @@ test_that("random search keeps the best weights, and of equal ones the first", {
   expect_identical(coef(agent_policy(agent)), seen[[3]][2, ])
   expect_identical(agent$best, 8L)
   expect_identical(agent$played, 9L)
+})
+
+test_that("an elite of one candidate leaves the deviation as it is", {
+  agent <- agent_start(agent_cem(population = 5), policy_network(c(2, 1)))
+  set.seed(1)
+  told <- agent_tell(agent, list(weights = agent_ask(agent), returns = c(1, 3, 2, 0, 1)))
+  expect_identical(told$deviation, agent$deviation)
 })

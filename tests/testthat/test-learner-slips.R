@@ -86,3 +86,13 @@ test_that("a table of another size, and seeds that repeat, are refused with both
   )
   refused(learn_q(walk, iterations = 1, seeds = c(1, 2, 1)), "but 1 occurs", "unique(seeds)")
 })
+
+test_that("a learning rate of 0, by which nothing is learned, is refused by every agent", {
+  for (make in list(agent_ppo, agent_reinforce, agent_dqn, agent_q, agent_sarsa, agent_monte_carlo,
+                    agent_actor_critic, \(...) agent_td(policy_random(), ...))) {
+    expect_error(make(learning_rate = 0), "`learning_rate` must be a number above 0",
+                 class = "gym_error_argument")
+    expect_s3_class(make(learning_rate = schedule_linear(0.1, 0, 100)), "gym_agent")
+  }
+  expect_error(agent_reinforce(value_learning_rate = 0), "above 0", class = "gym_error_argument")
+})

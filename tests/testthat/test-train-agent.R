@@ -24,7 +24,7 @@ test_that("a training has a row for each iteration, and one for each evaluation"
   expect_identical(trained$history$evaluation[c(3, 6)], trained$evaluations$mean_return[1:2])
   expect_true(all(is.na(trained$history$evaluation[-c(3, 6)])))
   expect_identical(trained$final, trained$evaluations[3, ], ignore_attr = TRUE)
-  expect_false(trained$solved)
+  expect_identical(trained$solved, NA)
   expect_identical(as.data.frame(trained), trained$history)
   expect_length(env$seeds, 6 * 7 + 4 * 3)
   # Of each step of the training the observation that was acted on.

@@ -22,6 +22,9 @@ test_that("the training of each seed is the one that the seed makes alone", {
   expect_identical(weights["2", ], coef(trained$trainings[["2"]]))
   # Without a target there is nothing to reach.
   expect_false(any(grepl("target|early", capture.output(print(trained)))))
+  expect_identical(as.data.frame(trained)$reached, rep(NA, 3))
+  expect_identical(trained$trainings[[1]]$solved, NA)
+  expect_output(print(summary(trained)), "mean return")
 })
 
 test_that("a row for each seed says whether its final evaluation has reached the target", {

@@ -24,11 +24,29 @@ test_that("moments that are merged are those of all observations", {
 
 test_that("numbers come in less their mean and divided by their deviation, constant ones as 0", {
   values <- observed(50, 3)
-  expect_identical(normalized(values, no_moments()), values)
-  expect_identical(normalized(values, NULL), values)
+  expect_identical(normalized(values, no_moments(), 10), values)
+  expect_identical(normalized(values, NULL, 10), values)
   by_hand <- scale(values[, 1:2])
   attributes(by_hand) <- list(dim = c(50L, 2L))
-  expect_equal(normalized(values, moments_of(values)), cbind(by_hand, 0, 0))
+  expect_equal(normalized(values, moments_of(values), 10), cbind(by_hand, 0, 0))
+})
+
+test_that("a normalised observation is clipped at 10, or where the policy says", {
+  withr::local_seed(1)
+  seen <- moments_of(matrix(rnorm(3000, sd = 1e-6)))
+  policy <- policy_network(c(1, 1), "identity", list(matrix(1)), normalize = TRUE)
+  at <- function(...) {
+    policy <- utils::modifyList(policy, list(moments = seen, ...), keep.null = TRUE)
+    predict(policy, rbind(1, -1, NaN), type = "output")
+  }
+  expect_identical(at(), c(10, -10, NaN))
+  expect_identical(at(clip_obs = 2.5), c(2.5, -2.5, NaN))
+  expect_gt(at(clip_obs = Inf)[[1]], 9e5)
+  # Versions that did not clip saved policies without the field.
+  expect_identical(at(clip_obs = NULL), at(clip_obs = Inf))
+  expect_identical(policy_linear(clip_obs = 5)$clip_obs, 5)
+  expect_error(policy_network(clip_obs = 0), "`clip_obs` must be a number above 0, or Inf, not 0",
+               class = "gym_error_argument")
 })
 
 test_that("pictures are normalised in the order in which R has them", {

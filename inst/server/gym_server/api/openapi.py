@@ -164,8 +164,9 @@ _TENSOR_BODIES: dict[Callable, str] = {
     "episode, 'candidate' (integers from 0) the candidate that plays it. If an environment is "
     "played in groups, 'row' is the episode's place in its group (the description's 'group'). "
     "'policy/weights' is float64 with a row for each candidate, 'policy/mean' and 'policy/scale' "
-    "normalize observations, 'policy/q' is a table of states by actions, 'policy/deviation' has "
-    "standard deviations. The other fields are JSON in its metadata.",
+    "normalize observations (the policy's 'clip_obs' clips them then), 'policy/q' is a table of "
+    "states by actions, 'policy/deviation' has standard deviations. The other fields are JSON in "
+    "its metadata.",
 }
 
 

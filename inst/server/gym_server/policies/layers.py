@@ -170,10 +170,13 @@ def _normalizing(plan: NetworkPlan, inputs: np.ndarray) -> Steps:
         return []
     across = (-1,) + (1,) * (inputs.ndim - 1)
     mean, scale = plan.mean.reshape(across), plan.scale.reshape(across)
-    return [
+    steps: Steps = [
         partial(np.subtract, inputs, mean, inputs),
         partial(np.multiply, inputs, scale, inputs),
     ]
+    if plan.clip_obs is not None:
+        steps.append(partial(inputs.clip, -plan.clip_obs, plan.clip_obs, inputs))
+    return steps
 
 
 def _misfit(observation: Any) -> GymServerError:

@@ -27,6 +27,7 @@ class NetworkPlan:
         epsilon: how often "epsilon-greedy" explores; None if not given.
         mean, scale: float64[inputs], which normalize inputs by ``(x - mean) * scale``; None for no
             normalization.
+        clip_obs: where to clip normalized inputs, on both sides of 0; None for no clipping.
     """
 
     observation_space: Box | Discrete
@@ -38,6 +39,7 @@ class NetworkPlan:
     epsilon: float | None
     mean: np.ndarray | None = None
     scale: np.ndarray | None = None
+    clip_obs: float | None = None
 
     @cached_property
     def shapes(self) -> list[tuple[int, int]]:

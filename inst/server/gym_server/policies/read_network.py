@@ -13,7 +13,14 @@ from gym_server.json_values import brief
 from gym_server.policies.activation import NAMES
 from gym_server.policies.network import NetworkPolicy
 from gym_server.policies.network_plan import NetworkPlan
-from gym_server.policies.reading import check_fields, count_of, epsilon_of, field, finite_numbers
+from gym_server.policies.reading import (
+    above_zero,
+    check_fields,
+    count_of,
+    epsilon_of,
+    field,
+    finite_numbers,
+)
 from gym_server.spaces import brief_space
 
 
@@ -27,7 +34,7 @@ def read_network(
     check_fields(
         document,
         tensors,
-        *("sizes", "activation", "bias", "output", "epsilon"),
+        *("sizes", "activation", "bias", "output", "epsilon", "clip_obs"),
         *("weights", "mean", "scale", "deviation"),
     )
     observed, acted = _supported(observation_space), _supported(action_space)
@@ -42,6 +49,7 @@ def read_network(
         output=_output(document, sizes[-1], acted),
         epsilon=epsilon_of(document),
         **_moments(tensors, observed, sizes[0]),
+        clip_obs=above_zero(document, "clip_obs"),
     )
     if plan.output == "epsilon-greedy" and plan.epsilon is None:
         raise invalid_policy('The output "epsilon-greedy" needs an epsilon, a number from 0 to 1')

@@ -47,10 +47,10 @@ def epsilon_of(document: Mapping) -> float | None:
     return number(document, "epsilon", 0, 1, "a number from 0 to 1")
 
 
-def temperature_of(document: Mapping) -> float | None:
-    """Return the temperature of the softmax; None for no softmax."""
-    above_zero, largest = math.nextafter(0, 1), math.nextafter(math.inf, 0)
-    return number(document, "temperature", above_zero, largest, "a number above 0")
+def above_zero(document: Mapping, name: str) -> float | None:
+    """Return a field that is a finite number above 0; None if it is missing."""
+    smallest, largest = math.nextafter(0, 1), math.nextafter(math.inf, 0)
+    return number(document, name, smallest, largest, "a number above 0")
 
 
 def numbers(tensors: Mapping[str, np.ndarray], name: str) -> np.ndarray:

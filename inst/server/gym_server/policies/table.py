@@ -14,12 +14,12 @@ from gym_server.json_values import brief
 from gym_server.policies.acting import Actor, Policy
 from gym_server.policies.discrete import DiscreteChoice
 from gym_server.policies.reading import (
+    above_zero,
     check_fields,
     count_of,
     epsilon_of,
     numbers,
     shape_text,
-    temperature_of,
 )
 from gym_server.policies.states import NOT_A_STATE, States, states_of
 from gym_server.spaces import brief_space
@@ -110,7 +110,7 @@ def read_table(
             f"{brief_space(observation_space)} cannot",
             "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these",
         )
-    epsilon, temperature = epsilon_of(document) or 0.0, temperature_of(document)
+    epsilon, temperature = epsilon_of(document) or 0.0, above_zero(document, "temperature")
     q = numbers(tensors, "q")
     shape = (states.count, int(action_space.n))
     if q.shape[-2:] != shape or q.ndim not in (2, 3) or not q.size:

@@ -169,6 +169,21 @@ def test_inputs_are_normalised():
         np.testing.assert_allclose(actor.act(observation), np.clip(wanted, -10, 10), rtol=1e-6)
 
 
+def test_normalised_inputs_are_clipped():
+    policy = network(
+        *([3, 3], ["identity"], box(3, np.inf), box(3, np.inf), [np.eye(3).ravel()]),
+        tensors={"mean": np.zeros(3), "scale": np.array([1e6, 1, 1e6])},
+        clip_obs=2.5,
+    )
+    for actor in (
+        begun(policy).act,
+        lambda row: begun(policy, np.zeros(2, int)).act([row, row])[1],
+    ):
+        np.testing.assert_array_equal(actor(np.array([1.0, -2, -1])), [2.5, -2, -2.5])
+        with pytest.raises(GymServerError, match="not a number"):
+            actor(np.array([np.nan, 0, 0]))
+
+
 def test_softmax_draws_by_the_outputs():
     policy = network(
         [1, 3], ["identity"], box(1), Discrete(3, start=1), [[0.0, 1.0, -1.0]], output="softmax"

@@ -65,6 +65,7 @@ CASES = [
     (NETWORK, {**WEIGHTS, "mean": np.zeros(4)}, "no tensor scale"),
     (NETWORK, {**WEIGHTS, "mean": np.zeros(3), "scale": np.ones(4)}, "mean must be a number for"),
     (NETWORK, {**WEIGHTS, "mean": np.zeros(4), "scale": with_value(4, np.inf)}, "scale must be"),
+    ({**NETWORK, "clip_obs": 0}, WEIGHTS, "clip_obs must be a number above 0, not 0"),
     ({**NETWORK, "output": "best"}, WEIGHTS, 'not "best"'),
     ({**NETWORK, "output": "softmax"}, WEIGHTS, 'not "softmax"'),
     ({**NETWORK, "output": "gaussian"}, WEIGHTS, "epsilon-greedy with 1 output for Discrete(2)"),
