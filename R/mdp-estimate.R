@@ -4,15 +4,17 @@
 #' as probabilities (maximum likelihood). Actions that were never tried are not in the model.
 #'
 #' @param x The result of [rollout()] with `steps = TRUE, next_observation = TRUE`, or a data frame
-#'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`, and optionally
-#'   `episode`, whose first rows show where episodes start.
+#'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`. The columns
+#'   `episode` and `step` tell which rows are the first of an episode, where episodes start. Without
+#'   `step` the rows of each episode must be in order. Without both, an episode goes on in the next
+#'   row until it is terminated.
 #' @param ... For methods.
 #' @return A model, see [gym_model()]. Its states and actions are all of the environment's, if the
 #'   rollout's policy knows them, and otherwise those from the lowest to the highest number in the
 #'   steps. A state that was reached but never left, because episodes were cut off there, counts as
 #'   terminal; a message says so.
-#' @section Errors: `gym_error_argument` for a rollout without steps, or observations that are not
-#'   Discrete.
+#' @section Errors: `gym_error_argument` for a rollout without steps, observations that are not
+#'   Discrete, or rows that are not in order.
 #' @seealso [env_model()], which gets the model from the environment
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -48,7 +50,7 @@ estimate_model.gym_rollout <- function(x, ...) {
     )
   }
   table <- data.frame(
-    episode = paste(steps$candidate %||% 1L, steps$episode),
+    steps[intersect(c("candidate", "episode", "step"), names(steps))],
     state = steps[[sub("^next_", "", after)]], action = steps$action,
     next_state = steps[[after]], reward = steps$reward,
     terminated = steps$terminated
@@ -67,8 +69,8 @@ estimate_model.data.frame <- function(x, ...) {
   if (is.null(x[["terminated"]])) x[["terminated"]] <- rep(FALSE, nrow(x))
   x[["probability"]] <- NULL
   steps <- check_transitions(x, "x", call)
+  first <- first_rows(steps, x, call)
   steps$terminated <- end_at_unknown(steps)
-  first <- if (is.null(x[["episode"]])) 1L else !duplicated(x[["episode"]])
   key <- do.call(paste, steps[c("state", "action", "next_state", "reward", "terminated")])
   count <- rowsum(rep(1, nrow(steps)), key, reorder = FALSE)[, 1L]
   table <- steps[!duplicated(key), ]
@@ -83,6 +85,39 @@ estimate_model.data.frame <- function(x, ...) {
     table, states, actions, starts / sum(starts),
     list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
   )
+}
+
+# The rows of the first steps of episodes.
+first_rows <- function(steps, x, call) {
+  steps$row <- seq_len(nrow(steps))
+  if (is.null(x[["episode"]]) && is.null(x[["step"]])) {
+    steps$episode <- cumsum(c(TRUE, steps$terminated[-nrow(steps)]))
+  } else {
+    steps[c("candidate", "episode", "step")] <- as.list(x)[c("candidate", "episode", "step")]
+    steps <- steps_by_episode(steps, "x", call)
+  }
+  check_order(steps, x, call)
+  steps$row[!duplicated(steps$episode)]
+}
+
+# In an episode each step starts where the one before has led.
+check_order <- function(steps, x, call) {
+  before <- steps[-nrow(steps), ]
+  after <- steps[-1L, ]
+  next_one <- if (is.null(steps$step)) TRUE else after$step == before$step + 1
+  apart <- before$terminated | before$next_state != after$state
+  wrong <- which(before$episode == after$episode & next_one & apart)
+  if (length(wrong)) {
+    i <- wrong[[1L]]
+    gym_abort(
+      c(paste0("Row ", after$row[[i]], " of `x` does not follow row ", before$row[[i]], ": that ",
+               "one leads to state ", before$next_state[[i]],
+               if (before$terminated[[i]]) ", where the episode ends", ", and row ",
+               after$row[[i]], " starts in state ", after$state[[i]], "."),
+        i = "The columns `episode` and `step` tell which row follows which."),
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
+  }
 }
 
 # As far as is known, arriving at a state that was never left ends the episode.

@@ -163,9 +163,6 @@ path_points <- function(path, names, call = rlang::caller_env()) {
     abort_argument(path, "a rollout with steps, a data frame of steps, TRUE or NULL", "path", call)
   }
   check_columns(path, names, "path", call)
-  # Each candidate's episodes are numbered from 1.
-  episode <- paste(path$candidate %||% 1L, path$episode %||% 1L)
-  data.frame(
-    episode = match(episode, unique(episode)), x = path[[names[[1L]]]], y = path[[names[[2L]]]]
-  )
+  path <- steps_by_episode(path, "path", call)
+  data.frame(episode = path$episode, x = path[[names[[1L]]]], y = path[[names[[2L]]]])
 }

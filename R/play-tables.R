@@ -79,3 +79,33 @@ step_rows <- function(batches) {
     before[[i]] + unlist(lapply(batches[[i]]$steps, function(step) step$at))
   }))
 }
+
+#' Put steps in order, episode after episode
+#'
+#' Without `step` the steps of each episode are taken to be in order.
+#' @param x A user's data frame of steps with some of the columns `candidate`, `episode` and `step`.
+#' @return The data frame, with `episode` numbered over all candidates.
+#' @noRd
+steps_by_episode <- function(x, arg, call) {
+  keys <- intersect(c("candidate", "episode"), names(x))
+  for (name in keys) {
+    check_column(x, name, "a number or a name", function(values) !is.na(values), arg, call)
+  }
+  # Each candidate's episodes are numbered from 1.
+  episode <- rep_len(paste(x[["candidate"]] %||% 1L, x[["episode"]] %||% 1L), nrow(x))
+  x[["episode"]] <- match(episode, unique(episode))
+  step <- x[["step"]]
+  if (!is.null(step)) {
+    check_column(x, "step", "whole numbers", are_whole_numbers, arg, call)
+    again <- which(duplicated(data.frame(x[["episode"]], step)))
+    if (length(again)) {
+      gym_abort(
+        c(paste0("Row ", again[[1L]], " of `", arg, "` is another step ", step[[again[[1L]]]],
+                 " of the same episode."),
+          i = "Number the episodes in a column `episode`."),
+        class = "gym_error_argument", argument = arg, value = x, call = call
+      )
+    }
+  }
+  x[order(x[["episode"]], step %||% seq_along(episode)), ]
+}

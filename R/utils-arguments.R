@@ -197,6 +197,26 @@ check_columns <- function(x, needed, arg, call) {
   }
 }
 
+check_column <- function(x, name, must, are_good, arg, call) {
+  good <- are_good(x[[name]])
+  if (!all(good)) {
+    row <- which(!good)[[1L]]
+    gym_abort(
+      paste0("The column `", name, "` of `", arg, "` must have ", must, ", and in row ", row,
+             " it has ", describe_value(x[[name]][[row]]), "."),
+      class = "gym_error_argument", argument = arg, value = x, call = call
+    )
+  }
+}
+
+# Each returns a flag for each value, or a single one for values of another type.
+are_finite <- function(x) if (is.numeric(x)) is.finite(x) else FALSE
+are_whole_numbers <- function(x) {
+  if (is.numeric(x)) is.finite(x) & x == trunc(x) & abs(x) <= .Machine$integer.max else FALSE
+}
+are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 else FALSE
+are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
+
 abort_argument <- function(x, must, arg, call) {
   gym_abort(
     c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),

@@ -94,6 +94,42 @@ test_that("a model is estimated by the shares of what was played", {
   expect_equal(unname(model$start), c(1, 0, 0))
 })
 
+test_that("episodes start at their lowest steps, whatever the order of the rows", {
+  played <- rollout(walk_model(), policy_random(), episodes = 20, seed = 1, steps = TRUE,
+                    next_observation = TRUE)
+  model <- estimate_model(played)
+  set.seed(1)
+  played$steps <- played$steps[sample(nrow(played$steps)), ]
+  expect_identical(estimate_model(played)$start, model$start)
+  table <- stats::setNames(played$steps, sub("obs_1", "state", names(played$steps)))
+  expect_identical(estimate_model(table)$start, model$start)
+  # In order, and nothing else is known.
+  table <- table[order(table$episode, table$step), ]
+  expect_identical(estimate_model(table[setdiff(names(table), "step")])$start, model$start)
+  expect_identical(
+    estimate_model(table[setdiff(names(table), c("episode", "step"))])$start, model$start
+  )
+})
+
+test_that("rows that are not in order are refused, and so is a step without an episode", {
+  refused <- function(table, text) {
+    expect_error(estimate_model(table), text, class = "gym_error_argument", fixed = TRUE)
+  }
+  played <- data.frame(
+    episode = c(1, 1, 2, 2), step = c(1, 2, 1, 2), state = c(0, 1, 0, 1), action = 0,
+    next_state = c(1, 2, 1, 2), reward = 0, terminated = c(FALSE, TRUE)
+  )
+  expect_identical(estimate_model(played)$start, c("0" = 1, "1" = 0, "2" = 0))
+  refused(played[c(2, 1, 3, 4), -2],
+          "Row 2 of `x` does not follow row 1: that one leads to state 2, where the episode ends")
+  refused(played[c(1, 3, 2, 4), -(1:2)], "leads to state 1, and row 2 starts in state 0")
+  refused(played[-1], "Row 3 of `x` is another step 1 of the same episode.")
+  played$step[[2]] <- NA
+  refused(played, "The column `step` of `x` must have whole numbers, and in row 2 it has NA")
+  played$episode[[2]] <- NA
+  refused(played, "The column `episode` of `x` must have a number or a name, and in row 2")
+})
+
 test_that("a state that was never left counts as an end, and that is said", {
   played <- data.frame(state = c(0, 1), action = 0, next_state = c(1, 2), reward = 0,
                        terminated = FALSE)

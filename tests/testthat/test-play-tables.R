@@ -118,6 +118,13 @@ test_that("the paths of candidates' episodes are apart", {
   points <- path_points(played, c("obs_1", "obs_2"))
   expect_identical(rle(points$episode)$lengths, played$episodes$length)
   expect_identical(unique(points$episode), 1:8)
+  # A user's table may have them in any order.
+  mixed <- played$steps[rev(seq_len(nrow(played$steps))), ]
+  mixed <- path_points(mixed[order(mixed$candidate, mixed$episode), ], c("obs_1", "obs_2"))
+  expect_identical(as.list(mixed), as.list(points))
+  mixed <- played$steps
+  mixed$episode[[1]] <- NA
+  expect_error(path_points(mixed, c("obs_1", "obs_2")), "`episode`", class = "gym_error_argument")
 })
 
 test_that("what is observed next is shown in a trajectory only when it is asked for", {
