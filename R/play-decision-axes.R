@@ -81,9 +81,7 @@ axis_place <- function(observed, axis, arg, call) {
 }
 
 observed_text <- function(observed) {
-  names <- observed$names
-  few <- if (length(names) > 12L) c(names[1:10], "...", names[[length(names)]]) else names
-  paste0("Its parts are ", paste(few, collapse = ", "), ".")
+  paste0("Its parts are ", few_names(observed$names), ".")
 }
 
 held_at <- function(observed, axes, at, call = rlang::caller_env()) {

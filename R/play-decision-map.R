@@ -249,6 +249,7 @@ policy_actions <- function(place, values, outputs) {
   }
   shape <- place$observation_space$shape
   observation <- shape_values(as.vector(t(values)), c(nrow(values), shape))
+  observation <- named_batch(place$observation_space, observation)
   vector_env <- place[c("observation_space", "action_space")]
   vector_env$call <- rlang::caller_env()
   act_batch(place$policy, observation, nrow(values), vector_env)

@@ -54,7 +54,7 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   row.names(grid) <- NULL
   place$call <- call
   n <- nrow(grid)
-  states <- values_batch(space, grid)
+  states <- named_batch(space, values_batch(space, grid))
   grid$action <- as.integer(keep_random_state(act_batch(place$policy, states, n, place)))
   if (inherits(place$policy, "gym_policy_table")) {
     row <- space_index(space)$index(states, n)

@@ -223,11 +223,11 @@ act.gym_policy_features <- function(policy, observation, ...) {
 
 #' @exportS3Method
 predict_policy.gym_policy_features <- function(policy, newdata, type, call = rlang::caller_env()) {
-  if (type == "action") {
-    return(act(policy, newdata))
-  }
   if (type == "probability") abort_no_probabilities(policy, call)
-  observed <- observed_batch(newdata, policy$observation_space)
+  observed <- observed_batch(newdata, policy$observation_space, "newdata", call)
+  if (type == "action") {
+    return(act_batch(policy, observed$batch, observed$n, NULL))
+  }
   feature_values(policy, observed$batch, observed$n)
 }
 

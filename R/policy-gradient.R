@@ -143,8 +143,7 @@ column_max <- function(x) {
 
 seen_columns <- function(policy, observation, call = rlang::caller_env()) {
   check_network(policy, call)
-  observation <- observations_from(observation, policy, call)
-  rows <- observation_rows(observation, policy$observation_space, call)
+  rows <- network_rows(policy, observation, "observation", call)
   network_columns(policy, rows$values, call)
 }
 

@@ -213,26 +213,47 @@ act_batch.gym_policy_model <- function(policy, observation, n, vector_env) {
 
 #' @export
 act.gym_policy_model <- function(policy, observation, ...) {
-  predict_policy(policy, observation, "action", rlang::current_env())
+  call <- rlang::current_env()
+  observed_action(policy, model_columns(policy, observation, "observation", call), call)
 }
 
 #' @exportS3Method
 predict_policy.gym_policy_model <- function(policy, newdata, type, call = rlang::caller_env()) {
   if (type == "probability") abort_no_probabilities(policy, call)
-  observed <- list(batch = newdata, one = FALSE)
-  if (is.data.frame(newdata)) {
-    columns <- as.list(narrow_values(newdata))
-  } else {
-    check_was_played(policy, call)
-    space <- policy$observation_space
-    if (is_stackable(space)) observed <- observed_batch(newdata, space, call)
-    columns <- observation_columns(space, observed$batch)
-  }
+  observed <- model_columns(policy, newdata, "newdata", call)
   if (type == "output") {
-    return(model_predictions(policy, columns, call))
+    model_predictions(policy, observed$columns, call)
+  } else {
+    observed_action(policy, observed, call)
   }
-  actions <- model_actions(policy, columns, call)
+}
+
+observed_action <- function(policy, observed, call) {
+  actions <- model_actions(policy, observed$columns, call)
   if (observed$one) batch_value(policy$action_space, actions, 1L) else actions
+}
+
+#' Put observations given by hand into the columns of a table
+#'
+#' A model with a formula finds its columns in a data frame itself.
+#' @return A list: `columns`, and `one`, whether it is a single observation.
+#' @noRd
+model_columns <- function(policy, observation, arg, call) {
+  space <- policy$observation_space
+  if (is.data.frame(observation) && (has_formula(policy$model) || is.null(space))) {
+    return(list(columns = as.list(narrow_values(observation)), one = FALSE))
+  }
+  check_was_played(policy, call)
+  observed <- if (is_stackable(space) || is.data.frame(observation)) {
+    observed_batch(observation, space, arg, call)
+  } else {
+    list(batch = in_order(space, parts_by_name(observation, space, arg, call)), one = FALSE)
+  }
+  list(columns = observation_columns(space, observed$batch), one = observed$one)
+}
+
+has_formula <- function(model) {
+  !is.null(tryCatch(stats::terms(model), error = function(cnd) NULL))
 }
 
 check_was_played <- function(policy, call) {
@@ -256,15 +277,13 @@ model_predictions <- function(policy, columns, call) {
     return(if (width == 1) numeric() else matrix(numeric(), 0L, width))
   }
   load_model_package(policy, call)
-  has_formula <- !is.null(tryCatch(stats::terms(policy$model), error = function(cnd) NULL))
-  newdata <- if (has_formula) list2DF(columns) else do.call(cbind, columns)
+  newdata <- if (has_formula(policy$model)) list2DF(columns) else do.call(cbind, columns)
   predicted <- tryCatch(
     do.call(stats::predict, c(list(quote(policy$model), quote(newdata)), policy$arguments)),
     error = function(cnd) {
-      known <- paste0("`", names(columns), "`", collapse = ", ")
       abort_prediction(
         policy, paste("failed:", conditionMessage(cnd)),
-        paste0("The columns that it can use are ", known), call, parent = cnd
+        paste("The columns that it can use are", few_names(names(columns))), call, parent = cnd
       )
     }
   )

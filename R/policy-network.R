@@ -232,8 +232,17 @@ act.gym_policy_network <- function(policy, observation, draw = TRUE, ...) {
   check_network(policy)
   check_flag(draw)
   if (!draw) policy <- greedy_policy(policy)
-  rows <- observation_rows(observation, policy$observation_space)
-  outputs <- network_outputs(policy, rows$values)
+  call <- rlang::current_env()
+  rows_action(policy, network_rows(policy, observation, "observation", call), call)
+}
+
+# Observations given by hand, as observation_rows() returns them, and the actions for them.
+network_rows <- function(policy, observation, arg, call) {
+  observation_rows(observation, policy$observation_space, policy$sizes[[1L]], arg, call)
+}
+
+rows_action <- function(policy, rows, call) {
+  outputs <- network_outputs(policy, rows$values, call)
   network_action(policy$action_space, outputs, policy, rows$one)
 }
 

@@ -1,8 +1,6 @@
 #' @rdname act
 #' @param object A policy made by [policy_network()] or [as_policy()].
-#' @param newdata Observations: a numeric vector for a single one, a matrix with one in each row, or
-#'   a data frame, such as the steps of a [rollout()], with a column for each number of an
-#'   observation under its name there.
+#' @param newdata Observations, as for `observation`.
 #' @param type `"action"`, the default, returns the policy's actions, or the most likely ones if it
 #'   draws them. `"output"` returns the outputs of the network, or the predictions of the model.
 #'   `"probability"` returns the probability of each action, for a network with the output
@@ -31,13 +29,12 @@ predict_policy.default <- function(policy, newdata, type, call = rlang::caller_e
 
 #' @exportS3Method
 predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlang::caller_env()) {
-  observation <- observations_from(newdata, policy, call)
-  if (type == "action") {
-    return(naming_own_call(act(policy, observation, draw = FALSE), "act", call))
-  }
   check_network(policy, call)
-  values <- observation_rows(observation, policy$observation_space)$values
-  outputs <- network_outputs(policy, values, call)
+  rows <- network_rows(policy, newdata, "newdata", call)
+  if (type == "action") {
+    return(rows_action(greedy_policy(policy), rows, call))
+  }
+  outputs <- network_outputs(policy, rows$values, call)
   if (type == "probability") {
     return(output_probabilities(policy, outputs, call))
   }
@@ -66,20 +63,4 @@ abort_no_probabilities <- function(policy, call) {
       i = "`policy_network(output = \"softmax\")` makes one."),
     class = "gym_error_argument", argument = "type", value = "probability", call = call
   )
-}
-
-# The observations in a data frame: the columns with their names, or all columns if it has none of
-# these names.
-observations_from <- function(newdata, policy, call) {
-  if (!is.data.frame(newdata)) {
-    return(newdata)
-  }
-  newdata <- narrow_values(newdata)
-  discrete <- inherits(policy$observation_space, "gym_space_discrete")
-  names <- number_names(policy$observation_space, if (discrete) 1L else policy$sizes[[1L]])
-  if (any(names %in% names(newdata))) {
-    check_columns(newdata, names, "newdata", call)
-    newdata <- newdata[names]
-  }
-  if (discrete) newdata[[1L]] else unname(frame_rows(newdata))
 }

@@ -50,11 +50,11 @@ act.gym_policy_table <- function(policy, observation, ...) {
 
 #' @exportS3Method
 predict_policy.gym_policy_table <- function(policy, newdata, type, call = rlang::caller_env()) {
+  observed <- observed_batch(newdata, states_of(policy), "newdata", call)
   if (type == "action") {
-    return(act(policy, newdata))
+    return(act_batch(policy, observed$batch, observed$n, NULL))
   }
   # The output is a value for each action.
-  observed <- observed_batch(newdata, states_of(policy))
   rows <- table_rows(policy, observed$batch, observed$n)
   if (type == "probability") row_probabilities(policy, rows) else rows
 }

@@ -36,7 +36,10 @@
 #' @param observation The observation. For the usual environments a numeric vector is one
 #'   observation, and a numeric matrix or a data frame has one in each row. If observations are
 #'   arrays, many of them have an additional first dimension. If they are single whole numbers, many
-#'   of them are an integer vector. A function has no observation space: it gets a vector as a
+#'   of them are an integer vector. Where the names of an observation's numbers are known, the
+#'   names of a vector and the column names of a matrix or a data frame must be these, in any order;
+#'   further columns of a data frame, such as the steps of a [rollout()], are ignored. Without names
+#'   numbers are taken by position. A function has no observation space: it gets a vector as a
 #'   matrix of one row.
 #' @param draw For a network that draws its actions: draw? `TRUE`, the default, or `FALSE` for the
 #'   most likely action, or the one with the largest value.
@@ -251,76 +254,4 @@ act_batch.default <- function(policy, observation, n, vector_env) {
   plain <- is.function(policy) && !has_act_method(policy)
   actions <- if (plain) policy(observation) else act(policy, observation)
   batch_actions(actions, n, vector_env)
-}
-
-# Observations as rows of numbers -------------------------------------------------
-
-#' Put one or many observations into the rows of a matrix
-#'
-#' @param space The observation space. `NULL` for a policy without one, which takes a vector for one
-#'   observation and a matrix for many.
-#' @return A list: `values`, a matrix with an observation in each row, its numbers in row-major
-#'   order, as Gymnasium flattens them; `one`, whether `observation` was a single observation and
-#'   not a batch.
-#' @noRd
-observation_rows <- function(observation, space, call = rlang::caller_env()) {
-  observation <- narrow_values(observation, function(x) plain_numbers(x, "observation", call))
-  # The number of dimensions of an observation: none in a discrete space, which has no shape.
-  rank <- if (is.null(space)) 1L else length(space$shape)
-  check_rows(observation, rank, space, call)
-  axes <- dim(observation)
-  if (is.null(axes) && rank == 1L) {
-    return(list(values = matrix(observation, nrow = 1L), one = TRUE))
-  }
-  if (is.data.frame(observation)) {
-    observation <- frame_rows(observation)
-  }
-  given <- if (!is.null(axes)) length(axes) else if (length(observation) == 1L) 0L else 1L
-  if (given == rank) {
-    list(values = matrix(row_major(observation), nrow = 1L), one = TRUE)
-  } else if (rank == 0L || is.null(axes)) {
-    list(values = matrix(observation, ncol = 1L), one = FALSE)
-  } else {
-    values <- matrix(row_major(observation), prod(axes[-1L]), axes[[1L]])
-    list(values = t(values), one = FALSE)
-  }
-}
-
-check_rows <- function(observation, rank, space, call) {
-  if (is.null(observation)) {
-    abort_argument(observation, "an observation", "observation", call)
-  }
-  if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
-    must <- paste("one value of", format(space), "in each row instead of several")
-    abort_argument(observation, must, "observation", call)
-  }
-}
-
-#' Put one or many observations into a batch
-#'
-#' @param space The observation space. If it has parts, `observation` is one observation, or a data
-#'   frame with a column for each part.
-#' @return A list: `batch`; `n`, the number of observations; `one`, whether `observation` was a
-#'   single observation and not a batch.
-#' @noRd
-observed_batch <- function(observation, space, call = rlang::caller_env()) {
-  if (is_stackable(space)) {
-    rows <- observation_rows(observation, space, call)
-    n <- nrow(rows$values)
-    rank <- length(space$shape)
-    batch <- if (rank == 0L) {
-      rows$values[, 1L]
-    } else if (rank == 1L) {
-      rows$values
-    } else {
-      shape_values(row_major(rows$values), c(n, space$shape))
-    }
-    list(batch = batch, n = n, one = rows$one)
-  } else if (is.data.frame(observation)) {
-    batch <- in_order(space, as.list(observation))
-    list(batch = batch, n = nrow(observation), one = FALSE)
-  } else {
-    check_value(space, observation, "", call)
-    list(batch = batch_of(space, list(in_order(space, observation))), n = 1L, one = TRUE)
-  }
 }

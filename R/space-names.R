@@ -1,4 +1,4 @@
-# The names of observations. A space may have an element `names`: for a Box of one dimension the
+# The names of observations. A space may have an element `names`: for an array of one dimension the
 # names of its numbers, for a Tuple those of its parts, for a Discrete space the name of its number
 # in tables. Values get their names after reading; code that reads and writes them does not need
 # names.
@@ -15,7 +15,7 @@ naming <- function(space, batch = FALSE) {
   if (has_parts(space)) {
     parts <- lapply(unname(space$spaces), naming, batch)
     naming_of_parts(parts, if (inherits(space, "gym_space_tuple")) labels)
-  } else if (is.null(labels) || !inherits(space, "gym_space_box")) {
+  } else if (is.null(labels) || !inherits(space, "gym_space_array")) {
     # A single number has none: it would be printed with its name at each step.
     NULL
   } else if (batch) {
@@ -30,6 +30,12 @@ naming <- function(space, batch = FALSE) {
       value
     }
   }
+}
+
+# A batch with the names that it has in play.
+named_batch <- function(space, batch) {
+  name <- naming(space, batch = TRUE)
+  if (is.null(name)) batch else name(batch)
 }
 
 naming_of_parts <- function(parts, labels) {

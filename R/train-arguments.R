@@ -74,7 +74,7 @@ unknown_arguments_hint <- function(names, agent) {
   c(
     i = if (length(names)) {
       paste0("These were taken for arguments of the environment: ",
-             paste0("`", names, "`", collapse = ", "), ".")
+             quoted_names(names), ".")
     },
     i = if (length(of_agent)) {
       paste0("An argument of the agent goes into its parentheses: `", of_agent[[1L]], "`.")

@@ -138,7 +138,7 @@ check_settings <- function(names, known, call) {
     gym_abort(
       c(paste0("The agent has no argument `", unknown[[1L]], "`, a column of `settings`."),
         i = did_you_mean(unknown[[1L]], known),
-        i = paste0("It has ", paste0("`", known, "`", collapse = ", "), ".")),
+        i = paste0("It has ", quoted_names(known), ".")),
       class = "gym_error_argument", argument = "settings", value = unknown, call = call
     )
   }

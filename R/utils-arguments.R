@@ -191,7 +191,9 @@ check_columns <- function(x, needed, arg, call) {
   absent <- setdiff(needed, names(x))
   if (length(absent)) {
     gym_abort(
-      paste0("`", arg, "` has no column ", paste0("`", absent, "`", collapse = ", "), "."),
+      c(paste0("`", arg, "` has no column ", quoted_names(absent), "."),
+        i = if (length(absent) == 1L) did_you_mean(absent, names(x)),
+        i = if (length(x)) paste0("Its columns are ", few_names(names(x)), ".")),
       class = "gym_error_argument", argument = arg, value = x, call = call
     )
   }

@@ -68,6 +68,16 @@ did_you_mean <- function(name, choices, form = "`%s`") {
   if (length(near)) paste0("Did you mean ", sprintf(form, near), "?")
 }
 
+quoted_names <- function(names) paste0("`", names, "`", collapse = ", ")
+
+# The names that there are; of many the first ones and the last.
+few_names <- function(names) {
+  if (length(names) <= 12L) {
+    return(quoted_names(names))
+  }
+  paste0(quoted_names(names[1:10]), ", ..., `", names[[length(names)]], "`")
+}
+
 # Prints an object that format() describes in one line.
 print_line <- function(x) {
   cat(format(x), "\n", sep = "")

@@ -73,6 +73,22 @@ test_that("a function is asked about the same points", {
   expect_true(all(seen[, 1, c(1, 3)] == 0))
 })
 
+test_that("a function gets the names that observations have in play", {
+  by_name <- pole_map(function(observation) as.integer(observation[, "pole_angle"] > 0))
+  expect_identical(by_name$grid$action, as.integer(by_name$grid$pole_angle > 0))
+  counted <- new_space(list(
+    name = "MultiDiscrete", shape = list(2L), dtype = "int64", nvec = list(3L, 2L)
+  ))
+  counted$names <- c("sum", "ace")
+  hand <- function(observation) as.integer(observation[, "sum"] == 2)
+  env <- gym_env(
+    reset = function(self) c(0L, 0L), step = function(self, action) NULL,
+    observation_space = counted, action_space = space_discrete(2)
+  )
+  map <- decision_map(env, hand)
+  expect_identical(map$grid$action, c(0L, 0L, 0L, 0L, 1L, 1L))
+})
+
 test_that("parts are named or numbered, and two need not be named", {
   policy <- policy_network(c(2, 1))
   env <- fake_environment(observation_space = box_space(c(-1, -2), c(1, 2)), id = "MountainCar-v0")
@@ -86,7 +102,7 @@ test_that("parts are named or numbered, and two need not be named", {
                  class = "gym_error_argument")
   }
   bad(message = "`x` and `y` must name two parts")
-  bad("pole_angle", message = paste(cartpole_parts, collapse = ", "))
+  bad("pole_angle", message = quoted_names(cartpole_parts))
   bad("pole_angle", "angle", message = "`y` must be a part of the observation, not \"angle\"")
   bad(1, 5, message = "`y`")
   bad(1, 1, message = "two different parts")
