@@ -88,9 +88,6 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
     fuzz = lasting(600, 10)
     return {
         "clients": python("clients", 32, 8_000 if quick else 200_000),
-        "schemathesis": pytest(
-            "tests/test_schemathesis.py", GYM_TEST_SCHEMA_CASES=500 if quick else 5000
-        ),
         "fuzz": pytest("tests/test_fuzz.py", GYM_TEST_FUZZ_SECONDS=fuzz),
         "fuzz-r": r("fuzz", fuzz),
         "cuts": pytest("tests/test_cuts.py", GYM_TEST_CUTS="all"),

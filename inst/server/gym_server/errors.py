@@ -263,7 +263,7 @@ def _from_http(error: HTTPException) -> GymServerError:
     match error.code:
         case 404:
             return GymServerError(
-                "not_found", "There is nothing at this URL", "GET /v1/openapi.json lists the routes"
+                "not_found", "There is nothing at this URL", "PROTOCOL.md lists the routes"
             )
         case 405:
             allowed = ", ".join(sorted(getattr(error, "valid_methods", None) or ()))

@@ -15,7 +15,7 @@ from gym_server.http_server.server import Server, bind
 pytestmark = pytest.mark.slow
 
 GET = b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
-LARGE = b"GET /v1/openapi.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+LARGE = b"GET /v1/registry/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 MOST = 10
 
 

@@ -21,12 +21,7 @@ from gym_server.api.routes import BLUEPRINTS, ROUTES
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
-from gym_server.errors import (
-    GymServerError,
-    body_too_large,
-    busy_receiving,
-    malformed_request,
-)
+from gym_server.errors import GymServerError, body_too_large, busy_receiving, malformed_request
 from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits, Watchers
@@ -107,7 +102,6 @@ class GymApp(Flask):
             self._monitor_root,
             config.stop if config.client_stop else _refuse_to_stop,
             Watchers(config.limits.max_watchers),
-            ROUTES,
             watch_keys if config.access.token is not None else None,
         )
         self._endpoints = {

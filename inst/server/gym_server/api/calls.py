@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gym_server.api.routing import Route
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
@@ -29,7 +28,6 @@ class Services:
         monitor_root: where monitors may write.
         stop: asks the server to stop after answering the requests in progress.
         watchers: counts the watchers that wait for a frame.
-        routes: all routes, for the OpenAPI document.
         watch_keys: the keys that open watch pages; None if pages need no key.
     """
 
@@ -38,7 +36,6 @@ class Services:
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers
-    routes: Sequence[Route]
     watch_keys: WatchKeys | None = None
 
 

@@ -11,16 +11,7 @@ from gymnasium.vector import AutoresetMode
 
 from gym_server.envs.config import Wrapper
 from gym_server.errors import invalid_parameter
-from gym_server.protocol.fields import (
-    BOOLEAN,
-    TRUE_OR_FALSE,
-    Field,
-    Kind,
-    boolean,
-    integer,
-    json_object,
-    text,
-)
+from gym_server.protocol.fields import BOOLEAN, Field, Kind, boolean, integer, json_object, text
 
 # Text that is visible on one line, and does not change the text direction of other lines.
 _NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
@@ -138,67 +129,20 @@ def _named(names: Mapping[str, Any]) -> Kind:
     """Create a field that accepts some names, ignoring case and underscores."""
     written = [f'"{name}"' for name in names]
     wanted = f"{', '.join(written[:-1])} or {written[-1]}"
-    return Kind({"type": "string", "enum": list(names)}, wanted, _one_of(names))
+    return Kind(wanted, _one_of(names))
 
 
-ANY_ID = Kind(
-    {"type": "string", "examples": ["CartPole-v1", "Pendulum-v1", "MountainCar-v0"]},
-    "a string",
-    lambda value: value,
-)
-NAME = Kind(
-    {"type": "string", "maxLength": _LONGEST_NAME, "pattern": _NAME},
-    f"a text of 1 to {_LONGEST_NAME} printable characters",
-    _name,
-)
-WRAPPERS = Kind(
-    {
-        "type": "array",
-        "items": {
-            "type": "object",
-            "required": ["name"],
-            "properties": {"name": {"type": "string"}, "kwargs": {"type": ["object", "null"]}},
-        },
-    },
-    'a list of objects of a "name" and "kwargs"',
-    _wrappers,
-)
-VIDEO_CALLABLE = Kind(
-    {"anyOf": [*TRUE_OR_FALSE, {"type": "integer", "minimum": 0}]},
-    "true, false or an integer n for every n-th episode",
-    _video_callable,
-)
-POSITIVE = Kind({"type": "integer", "minimum": 1}, "an integer, 1 or greater", _positive)
-_ONE_SEED = {"type": ["integer", "boolean"], "minimum": 0}
-_OWN_SEED = {"type": ["integer", "boolean", "null"], "minimum": 0}
-
-
-def _list_of(items: dict) -> dict:
-    return {"type": "array", "items": items, "minItems": 1}
-
-
-SEED = Kind({"oneOf": [_ONE_SEED, _list_of(_OWN_SEED)]}, "an integer, 0 or greater", _seed)
-RESET_SEED = Kind(
-    {"oneOf": [_ONE_SEED, _list_of({"oneOf": [_OWN_SEED, _list_of(_ONE_SEED)]})]},
-    "an integer, 0 or greater",
-    _reset_seed,
-)
-NUM_WORKERS = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", integer)
-MASK = Kind(
-    {"type": "array", "items": {"type": "boolean"}, "minItems": 1},
-    "a list of true or false for each sub-environment",
-    _mask,
-    empty_is_absent=False,
-)
-QUERY_INTEGER = Kind({"type": "integer", "minimum": 0}, "an integer, 0 or greater", _query_integer)
+ANY_ID = Kind("a string", lambda value: value)
+NAME = Kind(f"a text of 1 to {_LONGEST_NAME} printable characters", _name)
+WRAPPERS = Kind('a list of objects of a "name" and "kwargs"', _wrappers)
+VIDEO_CALLABLE = Kind("true, false or an integer n for every n-th episode", _video_callable)
+POSITIVE = Kind("an integer, 1 or greater", _positive)
+SEED = Kind("an integer, 0 or greater", _seed)
+RESET_SEED = Kind("an integer, 0 or greater", _reset_seed)
+NUM_WORKERS = Kind("an integer, 0 or greater", integer)
+MASK = Kind("a list of true or false for each sub-environment", _mask, empty_is_absent=False)
+QUERY_INTEGER = Kind("an integer, 0 or greater", _query_integer)
 VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
 AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
-FINAL_OBS = Field(
-    "final_obs",
-    BOOLEAN,
-    "Whether to send the last observations of episodes that were followed by a reset in the same "
-    "step (default true).",
-)
-INFO = Field(
-    "info", BOOLEAN, "Whether to make and send infos (default true); with false they are empty."
-)
+FINAL_OBS = Field("final_obs", BOOLEAN)
+INFO = Field("info", BOOLEAN)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gym_server.api import env_fields, schemas
+from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
@@ -18,50 +18,18 @@ bp = RouteBlueprint("envs")
 @bp.declare(
     "POST",
     "/v1/envs/",
-    Field("env_id", env_fields.ANY_ID, "The id, such as CartPole-v1.", required=True),
-    Field(
-        "seed",
-        env_fields.SEED,
-        "Seeds the action space, and the first reset unless that has a seed; with num_envs also a "
-        "list with one for each sub-environment.",
-    ),
-    Field(
-        "render_mode",
-        TEXT,
-        "rgb_array (the default if supported), or human: the same, but slowed down to real time "
-        "while somebody watches.",
-    ),
-    Field("kwargs", OBJECT, "Arguments of the environment."),
-    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's wrappers; the first one is innermost."),
-    Field(
-        "num_envs",
-        env_fields.POSITIVE,
-        "The number of sub-environments; absent for a single environment.",
-    ),
-    Field(
-        "vectorization_mode",
-        env_fields.VECTORIZATION_MODE,
-        "What runs the sub-environments; absent for the fastest that supports the request.",
-    ),
-    Field(
-        "num_workers",
-        env_fields.NUM_WORKERS,
-        "How many processes run the sub-environments; 0 for the server's own, absent to let the "
-        "server choose.",
-    ),
-    Field(
-        "autoreset_mode",
-        env_fields.AUTORESET_MODE,
-        "When a sub-environment whose episode ended is reset, in Gymnasium's terms; absent for "
-        "NextStep.",
-    ),
-    Field("name", env_fields.NAME, "Its owner's name for it; shown in lists."),
-    answer="instance_id, and everything about the environment",
+    Field("env_id", env_fields.ANY_ID, required=True),
+    Field("seed", env_fields.SEED),
+    Field("render_mode", TEXT),
+    Field("kwargs", OBJECT),
+    Field("wrappers", env_fields.WRAPPERS),
+    Field("num_envs", env_fields.POSITIVE),
+    Field("vectorization_mode", env_fields.VECTORIZATION_MODE),
+    Field("num_workers", env_fields.NUM_WORKERS),
+    Field("autoreset_mode", env_fields.AUTORESET_MODE),
+    Field("name", env_fields.NAME),
     once=True,
     grows=True,
-    schema=schemas.json_object(
-        {**schemas.ABOUT_INSTANCE, "instance_id": {"type": "string", "pattern": "^[0-9a-f]{8}$"}}
-    ),
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
@@ -69,39 +37,19 @@ def env_create(call: Call) -> dict:
     return call.services.instances.create(EnvConfig(**fields)).about()
 
 
-@bp.declare(
-    "GET",
-    "/v1/envs/",
-    answer="all_envs: env_id by instance_id",
-    schema=schemas.json_object(
-        {"all_envs": {"type": "object", "additionalProperties": schemas.TEXT}}
-    ),
-)
+@bp.declare("GET", "/v1/envs/")
 def env_list_all(call: Call) -> dict:
     """List the environments."""
     return {"all_envs": call.services.instances.env_ids()}
 
 
-@bp.declare(
-    "GET",
-    "/v1/instances/",
-    answer="instances: instance_id, env_id, name, num_envs, age_seconds, idle_seconds, steps, "
-    "watched of each, oldest first",
-    schema=schemas.json_object(
-        {"instances": {"type": "array", "items": schemas.json_object(schemas.LISTED_INSTANCE)}}
-    ),
-)
+@bp.declare("GET", "/v1/instances/")
 def instance_list(call: Call) -> dict:
     """List the environments, with how much they are used."""
     return {"instances": call.services.instances.list()}
 
 
-@bp.declare(
-    "GET",
-    INSTANCE,
-    answer="everything about the environment; needs_reset is true after done, too",
-    schema=schemas.json_object(schemas.ABOUT_INSTANCE),
-)
+@bp.declare("GET", INSTANCE)
 def env_about(call: Call) -> dict:
     """Describe an environment."""
     return call.instance.about()
@@ -110,25 +58,12 @@ def env_about(call: Call) -> dict:
 @bp.declare(
     "POST",
     INSTANCE + "reset/",
-    Field(
-        "seed",
-        env_fields.RESET_SEED,
-        "Seeds the environment and its action space; with sub-environments also a list with one "
-        "for each. One of these may be a list: the first for now, the others for the episodes that "
-        "the sub-environment starts automatically. After the last one it rests: a step returns its "
-        "last observation and a reward of 0.",
-    ),
-    Field("options", OBJECT, "Options for the environment."),
-    Field(
-        "reset_mask", env_fields.MASK, "Which sub-environments to reset; absent for all of them."
-    ),
+    Field("seed", env_fields.RESET_SEED),
+    Field("options", OBJECT),
+    Field("reset_mask", env_fields.MASK),
     env_fields.INFO,
-    answer="observation, info; with sub-environments one row for each",
     once=True,
     tensors=True,
-    schema=schemas.json_object(
-        {"observation": schemas.ANYTHING, "info": {"type": "object"}}, request=schemas.REQUEST
-    ),
 )
 def env_reset(call: Call) -> dict | Ready:
     """Start an episode."""
@@ -143,38 +78,14 @@ def env_reset(call: Call) -> dict | Ready:
 @bp.declare(
     "POST",
     INSTANCE + "step/",
-    Field(
-        "action",
-        ANYTHING,
-        "A member of the action space, except that the bounds of a Box are not checked; with "
-        "sub-environments one for each that steps.",
-        required=True,
-    ),
-    Field(
-        "render",
-        BOOLEAN,
-        "Whether to slow the step down to real time while somebody watches.",
-    ),
-    Field("step_mask", env_fields.MASK, "Which sub-environments step; absent for all of them."),
+    Field("action", ANYTHING, required=True),
+    Field("render", BOOLEAN),
+    Field("step_mask", env_fields.MASK),
     env_fields.INFO,
     env_fields.FINAL_OBS,
-    answer="observation, reward, done, terminated, truncated, info; with sub-environments one row "
-    "for each that stepped, and final_obs and final_sub_envs if sub-environments ended and were "
-    "reset in the same step",
     once=True,
     tensors=True,
     tensor_body=loads_tensors,
-    schema=schemas.json_object(
-        {
-            "observation": schemas.ANYTHING,
-            "reward": schemas.NUMBERS,
-            "done": schemas.FLAGS,
-            "terminated": schemas.FLAGS,
-            "truncated": schemas.FLAGS,
-            "info": {"type": "object"},
-        },
-        request=schemas.REQUEST,
-    ),
 )
 def env_step(call: Call) -> dict | Ready:
     """Take one step."""
@@ -187,10 +98,7 @@ def env_step(call: Call) -> dict | Ready:
 @bp.declare(
     "GET",
     INSTANCE + "render/",
-    Field(
-        "sub_env", env_fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."
-    ),
-    answer="the current frame",
+    Field("sub_env", env_fields.QUERY_INTEGER),
     grows=True,
     content_type="image/png",
     tensors=True,
@@ -203,16 +111,7 @@ def env_render(call: Call) -> Response:
     return Response(200, png(frame), "image/png")
 
 
-@bp.declare(
-    "GET",
-    INSTANCE + "model/",
-    answer="model: num_states and num_actions, both numbered from 0; start, the probability that "
-    "an episode starts in each state; state, action, next_state, probability, reward and "
-    "terminated, each with one element per transition with a probability above 0, sorted by state "
-    "and action. Time limits are not included",
-    grows=True,
-    schema=schemas.json_object({"model": schemas.TRANSITION_MODEL}),
-)
+@bp.declare("GET", INSTANCE + "model/", grows=True)
 def env_model(call: Call) -> dict | Ready:
     """Return the transition model of an environment that has one."""
     return call.instance.transition_model()

@@ -13,10 +13,10 @@ bp = RouteBlueprint("monitors")
 @bp.declare(
     "POST",
     INSTANCE + "monitor/start/",
-    Field("directory", TEXT, "Where to write, relative to --monitor-dir.", required=True),
-    Field("force", BOOLEAN, "Delete the files of monitors that have ended."),
-    Field("resume", BOOLEAN, "Continue the numbering of an earlier monitor."),
-    Field("video_callable", env_fields.VIDEO_CALLABLE, "Record a video of every (n-th) episode."),
+    Field("directory", TEXT, required=True),
+    Field("force", BOOLEAN),
+    Field("resume", BOOLEAN),
+    Field("video_callable", env_fields.VIDEO_CALLABLE),
     grows=True,
 )
 def env_monitor_start(call: Call) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gym_server.api import env_fields, schemas
+from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import RouteBlueprint
 from gym_server.envs.config import EnvConfig
@@ -32,38 +32,21 @@ def _keep(value: object) -> Keep:
     return Keep(**dict.fromkeys(value, True))
 
 
-_KEEP = Kind(
-    {"type": "array", "items": {"enum": list(_KEPT)}},
-    f"a list of some of {', '.join(_KEPT)}",
-    _keep,
-)
+_KEEP = Kind(f"a list of some of {', '.join(_KEPT)}", _keep)
 
 
 @bp.declare(
     "POST",
     "/v1/rollouts/",
-    Field("env_id", env_fields.ANY_ID, "The environment, such as CartPole-v1.", required=True),
-    Field("kwargs", OBJECT, "Arguments of the environment."),
-    Field("wrappers", env_fields.WRAPPERS, "Gymnasium's wrappers; the first one is innermost."),
-    Field(
-        "policy",
-        OBJECT,
-        'What plays, such as {"kind": "random"} or {"kind": "network", "sizes": [4, 2, 1], '
-        '"activation": ["tanh", "logistic"]}. Its numbers are tensors, such as policy/weights.',
-    ),
-    Field(
-        "max_steps",
-        env_fields.POSITIVE,
-        "The number of steps after which an episode is truncated; required if the environment has "
-        "no time limit.",
-    ),
-    Field("keep", _KEEP, "What to keep besides returns, lengths and flags; absent for nothing."),
-    answer="without the tensor 'seed' the environment's description, else the first episodes, in "
-    "order: return, length, terminated, truncated, moments/..., observation, action, step/...",
+    Field("env_id", env_fields.ANY_ID, required=True),
+    Field("kwargs", OBJECT),
+    Field("wrappers", env_fields.WRAPPERS),
+    Field("policy", OBJECT),
+    Field("max_steps", env_fields.POSITIVE),
+    Field("keep", _KEEP),
     grows=True,
     tensors=True,
     tensor_body=loads_file,
-    schema=schemas.json_object({"env_id": schemas.TEXT, "processes": schemas.COUNT}),
 )
 def rollouts(call: Call) -> dict | Response:
     """Play whole episodes with a policy that is sent as data."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -26,8 +25,6 @@ Handler = Callable[..., dict | Response | Ready | None]
 _MOST_KNOWN = 4096
 _LONGEST_KNOWN = 100
 
-_VARIABLE = re.compile(r"<(?:any\(([a-z_, ]+)\):)?([a-z_]+)>")
-
 
 class Callers(Enum):
     """Who may call a route on a server with a token."""
@@ -47,8 +44,6 @@ class Route:
             ``<any(a, b):name>`` one of some, which the handler gets under that name.
         fields: the fields of the body, or of a GET's query.
         handler: gets a ``Call``; returns a JSON object, another response, or None for 204.
-        answer: a description of the response.
-        schema: the JSON schema of a JSON response; None for any object.
         callers: who may call it.
         once: whether the body may have an idempotency key, with which the request is done only
             once.
@@ -56,7 +51,6 @@ class Route:
         ends_instance: whether it closes the instance in the path.
         content_type: the content type of an ordinary response.
         tensors: whether the response may be tensors, if the client accepts them.
-        html: whether the response may be HTML, if the client asks for it.
         tensor_body: reads a body of tensors; None if it may not be tensors.
         refusal_page: makes a page, from a path and a status, that people who may not call the route
             get instead of an error in JSON; None for no page.
@@ -66,35 +60,14 @@ class Route:
     path: str
     fields: tuple[Field, ...]
     handler: Handler
-    answer: str = ""
-    schema: dict[str, Any] | None = None
     callers: Callers = Callers.TOKEN
     once: bool = False
     grows: bool = False
     ends_instance: bool = False
     content_type: str = JSON
     tensors: bool = False
-    html: bool = False
     tensor_body: Callable[[bytes], dict] | None = None
     refusal_page: Callable[[str, int], Response] | None = None
-
-    @property
-    def status(self) -> int:
-        """The status of a successful response."""
-        return 200 if self.answer else 204
-
-    @property
-    def template(self) -> str:
-        """The path as in OpenAPI, with ``{name}``."""
-        return _VARIABLE.sub(r"{\2}", self.path)
-
-    @property
-    def variables(self) -> dict[str, list[str] | None]:
-        """The names of the path's variable parts, each with its values; None for any text."""
-        return {
-            name: values.split(", ") if values else None
-            for values, name in _VARIABLE.findall(self.path)
-        }
 
 
 class RouteBlueprint(Blueprint):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gym_server import viewing
-from gym_server.api import env_fields, schemas
+from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, Callers, RouteBlueprint
 from gym_server.api.watch_keys import KEY_SECONDS
@@ -52,14 +52,7 @@ def page(url: str, status: int) -> Response:
     return Response(status, html, _HTML, _PAGE_HEADERS)
 
 
-@bp.declare(
-    "GET",
-    _WATCH,
-    answer="a page for a browser",
-    callers=Callers.WATCHERS,
-    content_type=_HTML,
-    refusal_page=page,
-)
+@bp.declare("GET", _WATCH, callers=Callers.WATCHERS, content_type=_HTML, refusal_page=page)
 def env_watch(call: Call) -> Response:
     """Show an environment live to people."""
     try:
@@ -73,15 +66,7 @@ def env_watch(call: Call) -> Response:
     return page(call.url, status)
 
 
-@bp.declare(
-    "POST",
-    _WATCH + "key/",
-    answer="key: opens the page as watch/?key=KEY, without a token; seconds: how long it is valid "
-    "after its last use; both null if pages need no key",
-    schema=schemas.json_object(
-        {"key": schemas.or_null(schemas.TEXT), "seconds": schemas.or_null(schemas.COUNT)}
-    ),
-)
+@bp.declare("POST", _WATCH + "key/")
 def env_watch_key(call: Call) -> dict:
     """Make a key to an environment's page, for a browser without the token."""
     _ = call.instance
@@ -91,25 +76,13 @@ def env_watch_key(call: Call) -> dict:
     return {"key": keys.make(call.path["instance_id"]), "seconds": KEY_SECONDS}
 
 
-@bp.declare(
-    "GET",
-    _WATCH + "watch.css/",
-    answer="the page's style sheet",
-    callers=Callers.EVERYONE,
-    content_type=_CSS,
-)
+@bp.declare("GET", _WATCH + "watch.css/", callers=Callers.EVERYONE, content_type=_CSS)
 def env_watch_style(call: Call) -> Response:
     """Return the watch page's style sheet."""
     return Response(200, _read("watch.css"), _CSS, headers=_PAGE_HEADERS)
 
 
-@bp.declare(
-    "GET",
-    _WATCH + "<script>.js/",
-    answer="one of the page's scripts",
-    callers=Callers.EVERYONE,
-    content_type=_JAVASCRIPT,
-)
+@bp.declare("GET", _WATCH + "<script>.js/", callers=Callers.EVERYONE, content_type=_JAVASCRIPT)
 def env_watch_script(call: Call) -> Response:
     """Return one of the watch page's scripts."""
     name = call.path["script"]
@@ -121,21 +94,10 @@ def env_watch_script(call: Call) -> Response:
 @bp.declare(
     "GET",
     _WATCH + "state/",
-    Field(
-        "sub_env", env_fields.QUERY_INTEGER, "Which sub-environment, from 0; absent for the first."
-    ),
-    Field(
-        "after",
-        env_fields.QUERY_INTEGER,
-        "The number of the last frame that was seen; absent for the current one.",
-    ),
-    answer="number, state (running, ended, not_reset, busy), env_id, sub_env, num_envs, episode, "
-    "step, return, returns (of the last 100 episodes that ended, in any sub-environment), steps, "
-    "reward_threshold, fps (null unless shown in real time), frame (a PNG in Base64, or null), and "
-    "without a frame why_no_picture, hint and observation (names, values, size)",
+    Field("sub_env", env_fields.QUERY_INTEGER),
+    Field("after", env_fields.QUERY_INTEGER),
     callers=Callers.WATCHERS,
     grows=True,
-    schema=schemas.json_object({"number": schemas.or_null(schemas.COUNT), "state": schemas.TEXT}),
 )
 def env_watch_state(call: Call) -> Response:
     """Wait for a new frame; frames are drawn only while somebody waits."""
@@ -146,13 +108,7 @@ def env_watch_state(call: Call) -> Response:
     return Response(200, body, JSON, headers=(_NO_STORE,))
 
 
-@bp.declare(
-    "GET",
-    _WATCH + "presence/",
-    answer="watched: true",
-    callers=Callers.WATCHERS,
-    schema=schemas.json_object({"watched": schemas.FLAG}),
-)
+@bp.declare("GET", _WATCH + "presence/", callers=Callers.WATCHERS)
 def env_watch_presence(call: Call) -> dict:
     """Note that somebody still watches, without sending a frame."""
     call.instance.viewer.note_presence()

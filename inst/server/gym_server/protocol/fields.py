@@ -16,14 +16,12 @@ class Kind:
     """The values that a field may have.
 
     Attributes:
-        schema: its JSON schema.
         wanted: a description that completes "must be ...".
         parse: converts the JSON value; raises ValueError if it does not fit, and OverflowError
             for a number too large for a float.
         empty_is_absent: whether "" and [] mean that the field is not set, as in classic clients.
     """
 
-    schema: dict
     wanted: str
     parse: Callable[[object], object]
     empty_is_absent: bool = True
@@ -35,7 +33,6 @@ class Field:
 
     name: str
     kind: Kind
-    doc: str
     required: bool = False
 
 
@@ -81,7 +78,7 @@ def integer(value: object) -> int:
 
 
 def boolean(value: object) -> bool:
-    """Read a flag, which may also be a word, 1 or 0; else raise ValueError."""
+    """Read a flag; some classic clients send a word, 1 or 0. Raise ValueError for others."""
     if isinstance(value, str) and value.lower() in ("true", "false"):
         return value.lower() == "true"
     if isinstance(value, (bool, int, float)) and value in (0, 1):
@@ -126,33 +123,14 @@ def _request_id(value: object) -> RequestId:
     return RequestId(key, integer(value.get("number")))
 
 
-ANYTHING = Kind({}, "any JSON value", lambda value: value, empty_is_absent=False)
-# Some classic clients send flags as numbers and words.
-TRUE_OR_FALSE = (
-    {"type": "boolean"},
-    {"enum": [0, 1]},
-    {"type": "string", "pattern": "^([Tt][Rr][Uu][Ee]|[Ff][Aa][Ll][Ss][Ee])$"},
-)
-BOOLEAN = Kind({"anyOf": [*TRUE_OR_FALSE]}, "true or false", boolean)
-TEXT = Kind({"type": "string"}, "a string", text)
-OBJECT = Kind({"type": "object"}, "an object", json_object)
+ANYTHING = Kind("any JSON value", lambda value: value, empty_is_absent=False)
+BOOLEAN = Kind("true or false", boolean)
+TEXT = Kind("a string", text)
+OBJECT = Kind("an object", json_object)
 REQUEST_ID = Kind(
-    {
-        "type": "object",
-        "required": ["key", "number"],
-        "properties": {
-            "key": {"type": "string", "minLength": 1, "maxLength": 64, "pattern": "^[!-~]+$"},
-            "number": {"type": "integer", "minimum": 0},
-        },
-    },
     'an object of a "key" (1 to 64 visible ASCII characters) and a "number" (an integer, '
     "0 or greater)",
     _request_id,
 )
 
-REQUEST = Field(
-    "request",
-    REQUEST_ID,
-    "An idempotency key: however often the request arrives, it is done once. It has the client's "
-    "own key and a growing number. An instance accepts 256 keys per quarter of an hour (429).",
-)
+REQUEST = Field("request", REQUEST_ID)
