@@ -97,7 +97,7 @@ look_at_observation <- function(check, topic, observation, what) {
   }
   problem <- tryCatch(
     {
-      check_value(check$space, observation, "", NULL, bounds = TRUE)
+      check_value(allow_rounding(check$space), observation, "", NULL, bounds = TRUE)
       NULL
     },
     gym_error_space = function(cnd) cnd
@@ -111,7 +111,7 @@ look_at_observation <- function(check, topic, observation, what) {
     note_finding(check, topic, paste0(
       what, ", ", describe_value(observation), ", does not fit the space ", format(check$space),
       place, ": ", lower_first(first_line(problem))
-    ), key = paste("observation", first_line(problem)))
+    ), key = paste("observation", sub("outside.*", "outside", first_line(problem))))
   }
 }
 

@@ -4,9 +4,10 @@
 #' Describe an environment written in R
 #'
 #' @return A list: `observation_space`, `action_space`, `spec`; `limit`, the number of steps after
-#'   which an episode is cut off, `Inf` for never; `action_rules`, the action space without the
-#'   bounds of its Boxes, because a Box action outside its bounds is passed to the environment as in
-#'   Gymnasium; `fits_observations` and `fits_actions`, fast checks of batches.
+#'   which an episode is cut off, `Inf` for never; `observation_rules`, the observation space, whose
+#'   bounds allow a rounding; `action_rules`, the action space without the bounds of its Boxes,
+#'   because a Box action outside its bounds is passed to the environment as in Gymnasium;
+#'   `fits_observations` and `fits_actions`, fast checks of batches.
 #' @noRd
 new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
                        reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
@@ -16,7 +17,8 @@ new_traits <- function(observation_space, action_space, id, max_episode_steps = 
   check_count(max_episode_steps, allow_null = TRUE, call = call)
   check_number(reward_threshold, allow_null = TRUE, call = call)
   check_number(render_fps, min = 0.1, allow_null = TRUE, call = call)
-  rules <- loosen_boxes(action_space)
+  observation_rules <- allow_rounding(observation_space)
+  action_rules <- loosen_boxes(action_space)
   list(
     observation_space = observation_space,
     action_space = action_space,
@@ -26,9 +28,10 @@ new_traits <- function(observation_space, action_space, id, max_episode_steps = 
       render_fps = render_fps
     ),
     limit = max_episode_steps %||% Inf,
-    action_rules = rules,
-    fits_observations = quick_check(observation_space),
-    fits_actions = quick_check(rules)
+    observation_rules = observation_rules,
+    action_rules = action_rules,
+    fits_observations = quick_check(observation_rules),
+    fits_actions = quick_check(action_rules)
   )
 }
 

@@ -71,7 +71,8 @@ wrap_transform_observation <- function(traits, func, observation_space = NULL, c
   fit <- function(observation, n) {
     observation <- form_batch(space, observation, n)
     if (!changed$fits_observations(observation, n)) {
-      refuse_misfit(transform, space, observation, n, "observation_space", observation_space)
+      refuse_misfit(transform, changed$observation_rules, observation, n, "observation_space",
+                    observation_space)
     }
     tidy_value(space, observation, n)
   }
@@ -362,7 +363,7 @@ refuse_misfit <- function(transform, space, value, n, arg, given) {
       abort_transform(
         transform,
         paste0("must return ", count_of(n, sub("_space", "", arg)), " of ", format(space), ", not ",
-               describe_argument(value)),
+               describe_argument(value), ": ", sub("[.]$", "", first_line(cnd))),
         value, parent = cnd, class = "gym_error_space",
         fix = if (arg == "observation_space" && is.null(given)) {
           "If it changes the space of observations, give the new one as `observation_space`."

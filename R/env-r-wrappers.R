@@ -234,8 +234,8 @@ r_wrappers <- list(
 change_spaces <- function(traits, observation_space = traits$observation_space,
                           action_space = traits$action_space, call = NULL) {
   changed <- new_traits(observation_space, action_space, traits$spec$id, call = call)
-  parts <- c("observation_space", "action_space", "action_rules", "fits_observations",
-             "fits_actions")
+  parts <- c("observation_space", "action_space", "observation_rules", "action_rules",
+             "fits_observations", "fits_actions")
   traits[parts] <- changed[parts]
   traits
 }

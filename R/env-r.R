@@ -9,7 +9,8 @@
 #' together. The environment that you pass to them does not change.
 #'
 #' Each step checks the results of the functions. An observation must belong to the observation
-#' space, including its bounds; a reward must be one number; a flag `TRUE` or `FALSE`. Actions are
+#' space, including its bounds, beyond which a number that is not whole may be by a rounding, 1e-6
+#' times the bound (or 1e-6); a reward must be one number; a flag `TRUE` or `FALSE`. Actions are
 #' checked before `step` gets them. Only a Box action outside its bounds is passed on, as in
 #' Gymnasium. [check_env()] checks more.
 #'

@@ -87,7 +87,7 @@ checked_observation <- function(traits, observation, n, where, call) {
   space <- traits$observation_space
   if (!fits_quickly(space, observation, n, traits$fits_observations)) {
     tryCatch(
-      check_one_or_batch(space, observation, n, NULL),
+      check_one_or_batch(traits$observation_rules, observation, n, NULL),
       gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
@@ -124,8 +124,8 @@ refuse_observation <- function(cnd, space, where, call) {
       x = cnd$body[["x"]],
       i = "Change what it returns, or the environment's `observation_space`."
     ),
-    class = "gym_error_space", space = space, value = cnd$value, path = cnd$path,
-    sub_env = cnd$sub_env, call = call
+    class = "gym_error_space", argument = "env", space = space, value = cnd$value,
+    path = cnd$path, sub_env = cnd$sub_env, call = call
   )
 }
 

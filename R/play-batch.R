@@ -81,7 +81,8 @@ naming_call <- function(code, vector_env, changed = function() NULL) {
     code,
     gym_error = function(cnd) {
       own_step <- is_own_step(cnd$call)
-      hint <- if (own_step && inherits(cnd, "gym_error_space")) {
+      # Errors about an observation name the argument that is to blame.
+      hint <- if (own_step && inherits(cnd, "gym_error_space") && is.null(cnd$argument)) {
         "The policy returned this action."
       } else if (inherits(cnd, "gym_error_argument") && identical(cnd$argument, "policy")) {
         memory_hint(changed())

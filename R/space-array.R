@@ -168,13 +168,45 @@ wrong_number <- function(space, flat) {
 }
 
 out_of_bounds <- function(space, flat) {
-  flat <- round_to_dtype(as_double(flat), space$dtype)
-  bounds <- space_bounds(space)
-  outside <- !(flat >= bounds$low & flat <= bounds$high)
+  given <- as_double(flat)
+  flat <- round_to_dtype(given, space$dtype)
+  allowed <- allowed_bounds(space)
+  outside <- !(flat >= allowed$low & flat <= allowed$high)
   outside <- is.na(outside) | outside
   if (any(outside)) {
-    list(problem = "There is a number outside of the bounds", at = which(outside)[[1L]])
+    at <- which(outside)[[1L]]
+    bounds <- lapply(space_bounds(space), function(bound) as_double(rep_len(bound, at)[[at]]))
+    text <- lapply(c(given[[at]], bounds), format, digits = 15L)
+    outside <- paste("outside of the bounds", text[[2L]], "and", text[[3L]])
+    list(problem = paste0("There is a number ", outside, ": ", text[[1L]]), at = at,
+         outside = outside)
   }
+}
+
+#' Allow the numbers of a space to be outside of their bounds by a rounding
+#'
+#' An observation is computed, often from numbers of another dtype: float32 has seven digits.
+#' [space_contains()], whose answer is Gymnasium's, allows none.
+#' @noRd
+allow_rounding <- function(space) {
+  if (inherits(space, "gym_space_box") && !space$dtype %in% c(integer_dtypes, "bool")) {
+    space$tolerance <- 1e-6
+  }
+  inside <- intersect(c("space", "node_space", "edge_space"), names(space))
+  space[inside] <- lapply(space[inside], allow_rounding)
+  if (!is.null(space$spaces)) space$spaces <- lapply(space$spaces, allow_rounding)
+  space
+}
+
+allowed_bounds <- function(space) {
+  bounds <- space_bounds(space)
+  if (!is.null(space$tolerance)) {
+    rounding <- lapply(bounds, function(bound) {
+      ifelse(is.finite(bound), space$tolerance * pmax(1, abs(bound)), 0)
+    })
+    bounds <- list(low = bounds$low - rounding$low, high = bounds$high + rounding$high)
+  }
+  bounds
 }
 
 # Converts the number of an element, from 1 and row by row, to its indices, from 0.

@@ -38,8 +38,9 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
   if (!is_whole(space, value)) {
     abort_space(space, value, "A value of Discrete is one whole number", call, path)
   }
-  if (bounds && !is.null(out_of_bounds(space, value))) {
-    abort_space(space, value, "The number is outside of the bounds", call, path)
+  wrong <- if (bounds) out_of_bounds(space, value)
+  if (!is.null(wrong)) {
+    abort_space(space, value, paste("The number is", wrong$outside), call, path)
   }
 }
 

@@ -75,7 +75,7 @@ has_batch_shape <- function(values, n, shape) {
 # Comparing with one number for all, if possible, is much faster.
 quick_bounds <- function(space) {
   each <- prod(space$shape)
-  bounds <- lapply(space_bounds(space), function(bound) {
+  bounds <- lapply(allowed_bounds(space), function(bound) {
     as.vector(shape_values(rep(as_double(bound), length.out = each), space$shape))
   })
   low <- bounds$low

@@ -173,3 +173,27 @@ test_that("a function that takes a number of the first row for that of each is w
   expect_no_warning(first <- rollout(draws, ahead, 5, seed = 1))
   expect_identical(rollout(draws, ahead, 5, seed = 1)$episodes, first$episodes)
 })
+
+test_that("a computed observation may be beyond a bound by a rounding, and no more", {
+  sent <- function(x) {
+    env <- gym_env(
+      function(self) 0, function(self, action) list(observation = x, reward = 1, terminated = TRUE),
+      space_box(0, 100, shape = 1), space_discrete(1), id = "Sent"
+    )
+    parts <- space_dict(at = space_box(0, 100, shape = 1), all = space_box(c(0, 0), c(9, 100)))
+    func <- function(observation) list(at = observation, all = cbind(0, observation))
+    list(env, gym_wrap(env, "TransformObservation", func = func, observation_space = parts))
+  }
+  for (env in c(sent(100 + 9e-5), sent(-9e-7))) {
+    expect_identical(rollout(env, policy_random(), seed = 1)$episodes$return, 1)
+    expect_false("wrong" %in% check_env(env)$severity)
+  }
+  for (env in sent(100 + 2e-4)) {
+    error <- expect_error(rollout(env, policy_random(), seed = 1), class = "gym_error_space")
+    text <- rlang::cnd_message(error)
+    expect_match(text, "here is a number outside of the bounds 0 and 100: 100.0002", fixed = TRUE)
+    expect_no_match(text, "policy")
+  }
+  # The question whether a value is a member has Gymnasium's answer.
+  expect_false(space_contains(space_box(0, 100), 100 + 9e-5))
+})
