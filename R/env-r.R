@@ -51,8 +51,9 @@
 #'   `TRUE`.
 #' @param model The environment's [model][gym_model()], for [env_model()]; the table of its
 #'   transitions; or a function of the environment that returns one of them. `NULL`, the default,
-#'   for none. If you give a table, `reset` determines where episodes start: exactly if it is not
-#'   random, and otherwise estimated from 1000 resets.
+#'   for none. It gets the environment's spaces, which are Discrete and may have more states and
+#'   actions than the table. If you give a table, `reset` determines where episodes start: exactly
+#'   if it is not random, and otherwise estimated from 1000 resets.
 #' @param id The name of the environment in messages and titles, a string.
 #' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
 #'   `NULL`, the default, for no limit.

@@ -68,7 +68,8 @@ model_of_env.gym_server_env <- function(env, call) {
     terminated = column("terminated", "logical")
   )
   new_model(
-    table, env$observation_space, env$action_space, column("start", "numeric"),
+    table, env$observation_space, env$action_space,
+    stats::setNames(column("start", "numeric"), state_numbers(env$observation_space)),
     env$spec[c("id", "reward_threshold", "max_episode_steps")], call
   )
 }
@@ -90,11 +91,10 @@ model_of_env.gym_r_env <- function(env, call) {
   if (is_table) {
     model <- gym_model(model)
   }
-  check_fits_env(model, env, call)
+  model <- with_spaces_of(env, model, call)
   if (is_table) {
     model$start <- starts_of(env, model, call)
   }
-  model$spec <- env$spec[c("id", "reward_threshold", "max_episode_steps")]
   model
 }
 
@@ -140,19 +140,49 @@ abort_without_model <- function(env, call) {
   )
 }
 
-check_fits_env <- function(model, env, call) {
+# The model with the environment's spaces, which may have more states and actions than the table.
+with_spaces_of <- function(env, model, call) {
   if (!inherits(model, "gym_model")) {
     abort_argument(model, "a model or its table of transitions", "gym_env(model = )", call)
   }
-  for (name in c("observation_space", "action_space")) {
+  table <- model$transitions
+  numbers <- list(
+    observation_space = c(table$state, table$next_state), action_space = table$action
+  )
+  spaces <- lapply(rlang::set_names(names(numbers)), function(name) {
     # Of several sub-environments, one is enough.
     space <- env[[paste0("single_", name)]] %||% env[[name]]
-    if (!identical(format(model[[name]]), format(space))) {
-      gym_abort(
-        paste0("The model of ", environment_label(env), " has the ", sub("_", " ", name), " ",
-               format(model[[name]]), ", but the environment has ", format(space), "."),
-        class = "gym_error_argument", argument = "model", value = model, call = call
-      )
-    }
+    check_has_numbers(space, numbers[[name]], name, env, call)
+    space
+  })
+  new_model(
+    table, spaces$observation_space, spaces$action_space, model$start[model$start > 0],
+    env$spec[c("id", "reward_threshold", "max_episode_steps")], call
+  )
+}
+
+check_has_numbers <- function(space, numbers, name, env, call) {
+  what <- sub("_", " ", name)
+  if (!inherits(space, "gym_space_discrete")) {
+    count <- space_index(space)$count
+    gym_abort(
+      c(paste0("A model needs an ", what, " that is Discrete for now, but ",
+               environment_label(env), " has ", format(space), "."),
+        i = if (!is.null(count)) {
+          paste0("Code the parts as one number, the last part changing first, with `",
+                 name, " = space_discrete(", sprintf("%.0f", count), ")`.")
+        }),
+      class = "gym_error_argument", argument = "model", value = space, call = call
+    )
+  }
+  bounds <- space_bounds(space)
+  beyond <- numbers[numbers < bounds$low | numbers > bounds$high]
+  if (length(beyond)) {
+    gym_abort(
+      c(paste0("The model of ", environment_label(env), " has the number ", beyond[[1L]],
+               ", which its ", what, " ", format(space), " does not have."),
+        i = "`space_discrete(n, start)` has the numbers from `start` to `start + n - 1`."),
+      class = "gym_error_argument", argument = "model", value = beyond[[1L]], call = call
+    )
   }
 }

@@ -80,9 +80,10 @@ estimate_model.data.frame <- function(x, ...) {
   spaces <- attr(x, "spaces")
   states <- spaces$observation_space %||% spanned_space(c(table$state, table$next_state), "states")
   actions <- spaces$action_space %||% spanned_space(table$action, "actions")
-  starts <- tabulate(match(steps$state[first], state_numbers(states)), as.integer(states$n))
+  numbers <- state_numbers(states)
+  starts <- tabulate(match(steps$state[first], numbers), length(numbers))
   new_model(
-    table, states, actions, starts / sum(starts),
+    table, states, actions, stats::setNames(starts / sum(starts), numbers),
     list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
   )
 }

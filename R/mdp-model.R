@@ -17,8 +17,10 @@
 #'   and `next_state` (whole numbers), `reward` (a number), and optionally `probability` (default 1)
 #'   and `terminated` (whether the episode ends there; by default `TRUE` if no row leaves
 #'   `next_state`). An action without a row in a state is invalid there.
-#' @param start Where episodes start: a state's number, or a numeric vector with a probability for
-#'   each state. `NULL`, the default, draws uniformly from the states that some row leaves.
+#' @param start Where episodes start: a state's number, or several of them, which are equally
+#'   likely; or probabilities, with the states' numbers as names, or one for each state. (A vector
+#'   with as many elements as there are states has probabilities.) `NULL`, the default, draws
+#'   uniformly from the states that some row leaves.
 #' @param id Its name in messages and titles, a string.
 #' @param max_episode_steps The number of steps after which an episode is cut off in play, a whole
 #'   number. `NULL`, the default, for no limit.
@@ -61,16 +63,9 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
     max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
   )
   table <- check_transitions(transitions)
-  start <- plain_numbers(start)
   states <- spanned_space(c(table$state, table$next_state), "states")
-  if (is_number(start)) {
-    if (!start %in% table$state) {
-      must <- "the number of a state that some row leaves"
-      abort_argument(start, must, "start", rlang::current_env())
-    }
-    start <- as.double(state_numbers(states) == start)
-  }
-  new_model(table, states, spanned_space(table$action, "actions"), start, spec)
+  actions <- spanned_space(table$action, "actions")
+  new_model(table, states, actions, plain_numbers(start), spec)
 }
 
 # The space of all numbers from the lowest to the highest.
@@ -92,7 +87,7 @@ spanned_space <- function(numbers, what, call = rlang::caller_env()) {
 
 #' Make a model from a table
 #'
-#' @param start The probability that each state is the first one, or `NULL`.
+#' @param start As for [gym_model()].
 #' @param table As returned by [check_transitions()].
 #' @param call The user's call.
 #' @noRd
@@ -186,17 +181,27 @@ check_ends <- function(table, call) {
 start_probabilities <- function(start, table, states, call) {
   numbers <- state_numbers(states)
   left <- numbers %in% table$state
+  given <- start
   if (is.null(start)) {
     start <- left / sum(left)
+  } else if (!is.null(names(start))) {
+    places <- match(names(start), numbers)
+    known <- !anyNA(places) && !anyDuplicated(places)
+    start <- if (known) replace(numeric(length(numbers)), places, unname(start))
+  } else if (is_number(start) || length(start) != length(numbers)) {
+    known <- all(start %in% numbers) && !anyDuplicated(start)
+    start <- if (known) (numbers %in% start) / length(start)
   }
-  if (length(start) != length(numbers) || !all(are_probabilities(start)) ||
-        abs(sum(start) - 1) > sum_tolerance) {
-    must <- paste("a state's number, or probabilities that add up to 1, one for each of",
-                  count_of(length(numbers), "state"))
-    abort_argument(start, must, "start", call)
+  if (is.null(start) || !all(are_probabilities(start)) || abs(sum(start) - 1) > sum_tolerance) {
+    must <- paste0(
+      "the numbers of states, or probabilities that add up to 1, with the states' numbers as ",
+      "names, or one for each of ", count_of(length(numbers), "state")
+    )
+    abort_argument(given, must, "start", call)
   }
   if (any(start[!left] > 0)) {
-    abort_argument(numbers[!left & start > 0][[1L]], "a state that some row leaves", "start", call)
+    must <- "the number of a state that some row leaves"
+    abort_argument(numbers[!left & start > 0][[1L]], must, "start", call)
   }
   stats::setNames(as.double(start), numbers)
 }

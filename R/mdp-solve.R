@@ -52,7 +52,8 @@
 #'     \item{q}{The value of each action in each state, a matrix with a row for each state and a
 #'       column for each action; `-Inf` for an invalid action.}
 #'     \item{actions}{The numbers of the best actions, an integer vector; with a horizon a matrix
-#'       with a column for each step, in order. `NULL` for a given policy.}
+#'       with a column for each step, in order. `NA` for a terminal state, or another one without
+#'       actions. `NULL` for a given policy.}
 #'     \item{policy}{The best policy, a [policy_table()], or the given one. `NULL` with a horizon,
 #'       because such a policy counts steps.}
 #'     \item{start_value}{The value of the start, a number: the mean value over the starting
@@ -161,6 +162,8 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   if (is.null(policy)) {
     choice <- found$choice %||% do.call(cbind, rev(notes$choices))
     actions <- choice + first_action - 1L
+    # In a terminal state there is nothing to do; the states of a matrix are its rows.
+    actions[rowSums(possible_of(backup)) == 0] <- NA
     if (is.null(horizon)) {
       probabilities <- choice_probabilities(backup, choice)
       policy <- table_policy_of(model, probabilities)

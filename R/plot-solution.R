@@ -85,6 +85,7 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   if (is.matrix(x$actions)) cells$action <- x$actions[, step]
   numbers <- state_numbers(x$model$action_space)
   if (inherits(x$policy, "gym_policy_table")) cells$action <- numbers[best_column(x$policy$q)]
+  cells$action[row_max(x$q) == -Inf] <- NA
   known <- known_grid(x$model$spec$id)
   directions <- action_directions(directions, known, numbers, call)
   kinds <- state_kinds(x$model)

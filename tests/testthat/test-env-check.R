@@ -374,7 +374,8 @@ test_that("starts, rewards and ends that a model does not have are found", {
                  "state 3 in play for the reward 1, which by the model is 5.")
   expect_finding(modelled(walk_model(), ends = 3, reset = function(self) self$at <- 1), "model",
                  "Action 0 led from state 1 to state 0 in play and the episode went on")
-  expect_finding(modelled(table[1:2, ]), "model", "has the observation space")
+  table$next_state[[4]] <- 4
+  expect_finding(modelled(table), "model", "has the number 4, which its observation space")
   expect_finding(modelled(function(env) stop("no table")), "model", "no table")
 })
 

@@ -101,11 +101,43 @@ test_that("an environment in R has the model that it was given", {
   }
   expect_error(env_model(make(NULL)), "Walk-v0 has no model", class = "gym_error_no_model")
   expect_error(make(5), "`model` must be a model", class = "gym_error_argument")
-  expect_error(env_model(make(walk_table()[1:2, ])), "observation space",
-               class = "gym_error_argument")
   gym_register("OwnWalk-v0", make(walk_table()))
   withr::defer(gym_unregister("OwnWalk-v0"))
   expect_equal(solve_mdp("OwnWalk-v0", policy = policy_random())$values[["1"]], 1 / 3)
+})
+
+test_that("a model has all states and actions of its environment, used or not", {
+  make <- function(model, observation_space, actions = 2) {
+    gym_env(
+      reset = function(self) 11, model = model,
+      step = function(self, action) {
+        list(observation = if (action == 1) 13 else 10, reward = action, terminated = TRUE)
+      },
+      observation_space = observation_space, action_space = space_discrete(actions), id = "Far-v0",
+      max_episode_steps = 9
+    )
+  }
+  far <- walk_table()
+  far[c("state", "next_state")] <- far[c("state", "next_state")] + 10
+  for (model in list(far, gym_model(far, start = 11))) {
+    env <- make(model, space_discrete(3300), 3)
+    found <- env_model(env)
+    expect_length(found$start, 3300)
+    expect_identical(which(found$start > 0), c("11" = 12L))
+    expect_identical(dim(solve_mdp(found)$q), c(3300L, 3L))
+    learned <- learn_q(env, iterations = 2, seed = 1)
+    expect_identical(dim(learned$policy$q), c(3300L, 3L))
+    expect_identical(learned$final$episodes, 0L)
+  }
+  expect_error(env_model(make(far, space_discrete(12))), "has the number 12, which its observation",
+               class = "gym_error_argument")
+  expect_error(env_model(make(far, space_discrete(14), 1)), "its action space",
+               class = "gym_error_argument")
+  expect_error(
+    env_model(make(far, space_multi_discrete(c(55, 60)))),
+    "Discrete for now, but Far-v0.*observation_space = space_discrete\\(3300\\)",
+    class = "gym_error_argument"
+  )
 })
 
 test_that("of a table that names no start episodes start where `reset()` does", {

@@ -30,6 +30,16 @@ test_that("without a start episodes begin in any state that is left", {
   expect_equal(unname(gym_model(walk_table(), start = c(0, 0.2, 0.8, 0))$start), c(0, 0.2, 0.8, 0))
 })
 
+test_that("episodes start in one of several states, or by the probabilities of some", {
+  start_of <- function(start) unname(gym_model(walk_table(), start = start)$start)
+  expect_equal(start_of(c(2, 1)), c(0, 0.5, 0.5, 0))
+  expect_equal(start_of(c("2" = 0.8, "1" = 0.2)), c(0, 0.2, 0.8, 0))
+  expect_equal(start_of(gym_model(walk_table(), start = 2)$start), c(0, 0, 1, 0))
+  # As many elements as states are probabilities.
+  two <- data.frame(state = c(0, 1), action = 0, next_state = 1, reward = 0, terminated = TRUE)
+  expect_equal(unname(gym_model(two, start = c(0, 1))$start), c(0, 1))
+})
+
 test_that("what is no model is refused by name", {
   refused <- function(table, text, ...) {
     expect_error(gym_model(table, ...), text, class = "gym_error_argument", fixed = TRUE)
@@ -55,7 +65,12 @@ test_that("what is no model is refused by name", {
   refused(wrong, "No row leaves state 3, and arriving there does not end the episode.")
   refused(walk_table(), "`start` must be the number of a state that some row leaves", start = 3)
   refused(walk_table(), "one for each of 4 states", start = c(0.5, 0.5))
-  refused(walk_table(), "`start` must be a state that some row leaves", start = c(1, 0, 0, 0))
+  refused(walk_table(), "`start` must be the number of a state that some row leaves",
+          start = c(1, 0, 0, 0))
+  refused(walk_table(), "`start` must be the numbers of states", start = c(1, 9))
+  refused(walk_table(), "`start` must be the numbers of states", start = c(1, 1))
+  refused(walk_table(), "`start` must be the numbers of states", start = c("1" = 0.5, a = 0.5))
+  refused(walk_table(), "with the states' numbers as names", start = c("1" = 0.5, "2" = 0.6))
 })
 
 test_that("a model is arrays for other packages, with a state for the end", {

@@ -88,12 +88,23 @@ test_that("a solution is a table, a policy and a print", {
   solved <- solve_mdp(walk_model(id = "Walk", max_episode_steps = 1))
   expect_identical(
     as.data.frame(solved),
-    data.frame(state = 0:3, value = c(0, 1, 1, 0), action = c(0L, 1L, 1L, 0L))
+    data.frame(state = 0:3, value = c(0, 1, 1, 0), action = c(NA, 1L, 1L, NA))
   )
   expect_identical(act(solved$policy, c(1L, 2L)), c(1L, 1L))
   # One step does not suffice.
   expect_identical(solved$limited, 0)
   expect_output(print(solved), "the same policy, cut off after 1 step  0", fixed = TRUE)
+})
+
+test_that("in a terminal state there is no best action, in tables and pictures", {
+  expect_identical(solve_mdp(walk_model())$actions, c(NA, 1L, 1L, NA))
+  within <- solve_mdp(walk_model(), horizon = 2)
+  expect_identical(within$actions[c(1, 4), ], matrix(NA_integer_, 2, 2))
+  for (given in list(list(), list(policy = policy_table(matrix(c(1, 0), 4, 2, byrow = TRUE))))) {
+    solved <- rlang::exec(solve_mdp, walk_model(), !!!given)
+    cells <- ggplot2::autoplot(solved)$data
+    expect_identical(is.na(cells$action), c(TRUE, FALSE, FALSE, TRUE))
+  }
 })
 
 test_that("policies that do not fit the model are refused", {
