@@ -1,5 +1,7 @@
 """Find the route of a request."""
 
+import re
+
 import pytest
 
 from gym_server.api.routes import ROUTES
@@ -19,10 +21,11 @@ def found(app):
 @pytest.mark.parametrize("route", ROUTES, ids=lambda route: route.handler.__name__)
 def test_every_route_is_found_with_and_without_its_last_slash(found, route):
     assert route.path.endswith("/")
-    path, variables = route.template, {}
-    for number, (name, values) in enumerate(route.variables.items()):
-        variables[name] = values[-1] if values else str(number)
-        path = path.replace(f"{{{name}}}", variables[name])
+    path, variables = route.path, {}
+    parts = re.findall(r"<(?:any[(](.*?)[)]:)?(.*?)>", path)
+    for number, (values, name) in enumerate(parts):
+        variables[name] = values.split(", ")[-1] or str(number)
+        path = re.sub("<.*?>", variables[name], path, count=1)
     for written in (path, path.removesuffix("/")):
         assert found(written, route.method) == (route.handler.__name__, variables)
 
