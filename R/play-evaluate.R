@@ -18,7 +18,8 @@
 #'   policies in a list, or of rows of weights.
 #' @section Errors: As for [rollout()].
 #' @references The interval is that of [stats::t.test()].
-#' @seealso [rollout()]; its [plot()][plot.gym_rollout()] compares policies in a picture.
+#' @seealso [plot()][plot.gym_evaluation()] for a picture; [rollout()], whose
+#'   [plot()][plot.gym_rollout()] shows all returns.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' follow_pole <- function(observation) as.integer(observation[, 3] > 0)

@@ -1,4 +1,5 @@
-# Several policies in one picture: a row for each with the distribution of its returns.
+# Several policies in one picture: a row for each with the distribution of its returns, and a column
+# for each environment.
 
 # More rows than this could not be told apart.
 most_rows <- 10L
@@ -6,6 +7,7 @@ most_rows <- 10L
 comparison_picture <- function(rollouts) {
   data <- comparison_plot_data(rollouts)
   returns <- data$returns
+  one_env <- nlevels(returns$env_id) == 1L
   ggplot2::ggplot(
     returns, ggplot2::aes(.data$value, fill = .data$label, colour = .data$label)
   ) +
@@ -14,26 +16,29 @@ comparison_picture <- function(rollouts) {
       ggplot2::aes(y = ggplot2::after_stat(.data$scaled)), returns[!returns$few, ], trim = TRUE,
       alpha = 0.4
     ) +
-    ggplot2::geom_bar(
-      ggplot2::aes(y = ggplot2::after_stat(of_highest(.data$count, .data$PANEL))),
-      returns[returns$few, ], width = bar_width(returns$value[returns$few], returns$value),
-      # Bars may be wider than the distance between two values, so that they are seen.
-      position = "identity", alpha = 0.4
-    ) +
+    lapply(unname(split(returns, returns$env_id)), bars_of_rows) +
     ggplot2::geom_rug(sides = "b", length = ggplot2::unit(0.08, "npc")) +
     ggplot2::geom_vline(
       ggplot2::aes(xintercept = .data$median), data$rows, linetype = "dashed", linewidth = 0.8,
       colour = gym_colours[["ink"]]
     ) +
-    ggplot2::facet_wrap(
-      ggplot2::vars(.data$label), ncol = 1L, strip.position = "left",
-      labeller = ggplot2::as_labeller(row_titles(data$rows), ggplot2::label_wrap_gen(30))
-    ) +
+    (if (one_env) {
+      ggplot2::facet_wrap(
+        ggplot2::vars(.data$label), ncol = 1L, strip.position = "left",
+        labeller = ggplot2::as_labeller(row_titles(data$rows), ggplot2::label_wrap_gen(30))
+      )
+    } else {
+      ggplot2::facet_grid(
+        ggplot2::vars(.data$label), ggplot2::vars(.data$env_id), scales = "free_x", switch = "y",
+        labeller = ggplot2::label_wrap_gen(30)
+      )
+    }) +
     ggplot2::scale_fill_manual(
-      values = named_colours(data$rows$label), aesthetics = c("fill", "colour"), guide = "none"
+      values = named_colours(levels(data$rows$label)), aesthetics = c("fill", "colour"),
+      guide = "none"
     ) +
     ggplot2::scale_x_continuous(
-      breaks = (if (all(returns$few)) bar_marks(returns$value)) %||% ggplot2::waiver()
+      breaks = (if (one_env && all(returns$few)) bar_marks(returns$value)) %||% ggplot2::waiver()
     ) +
     ggplot2::scale_y_continuous(breaks = NULL, expand = ggplot2::expansion(c(0.12, 0.03))) +
     picture_labels(data$title, data$subtitle, x = "return of an episode", y = NULL) +
@@ -44,6 +49,17 @@ comparison_picture <- function(rollouts) {
     )
 }
 
+# Bars of one environment.
+bars_of_rows <- function(returns) {
+  few <- returns[returns$few, ]
+  ggplot2::geom_bar(
+    ggplot2::aes(y = ggplot2::after_stat(of_highest(.data$count, .data$PANEL))), few,
+    width = bar_width(few$value, returns$value),
+    # Bars may be wider than the distance between two values, so that they are seen.
+    position = "identity", alpha = 0.4
+  )
+}
+
 of_highest <- function(count, row) count / stats::ave(count, droplevels(row), FUN = max)
 
 row_titles <- function(rows) {
@@ -52,33 +68,41 @@ row_titles <- function(rows) {
 
 #' Compute the data of a plot of several policies
 #' @param rollouts A list of rollouts with names.
-#' @return A list: `rows`, a data frame with a row for each policy, from the top: `label`, `median`;
-#'   `returns`, a data frame: `label`, `value`, and `few`, whether the policy's returns are bars;
-#'   `title`, `subtitle`.
+#' @return A list: `rows`, a data frame with a row for each policy and environment, from the top:
+#'   `label`, `env_id`, `median`; `returns`, a data frame: `label`, `env_id`, `value`, and `few`,
+#'   whether the policy's returns are bars; `title`, `subtitle`.
 #' @noRd
 comparison_plot_data <- function(rollouts) {
-  groups <- unlist(unname(Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)),
-                   recursive = FALSE)
-  shown <- shown_groups(groups)
+  each <- Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)
+  ids <- rep(vapply(rollouts, function(x) x$env_id, ""), lengths(each))
+  groups <- unlist(unname(each), recursive = FALSE)
+  by_env <- lapply(split(groups, factor(ids, unique(ids))), shown_groups)
+  shown <- unlist(unname(by_env), recursive = FALSE)
   # In the order of the rows, which is that of the colours.
-  label <- factor(names(shown), names(shown))
-  counts <- unique(range(lengths(shown)))
+  label <- factor(names(shown), unique(names(shown)))
+  env_id <- factor(rep(names(by_env), lengths(by_env)), names(by_env))
   list(
     rows = data.frame(
-      label = label, median = vapply(shown, stats::median, 0), row.names = NULL
+      label = label, env_id = env_id, median = vapply(shown, stats::median, 0), row.names = NULL
     ),
     returns = data.frame(
-      label = rep(label, lengths(shown)), value = unlist(shown, use.names = FALSE),
+      label = rep(label, lengths(shown)), env_id = rep(env_id, lengths(shown)),
+      value = unlist(shown, use.names = FALSE),
       few = rep(vapply(shown, has_few, NA), lengths(shown))
     ),
-    title = paste(unique(vapply(rollouts, function(x) x$env_id, "")), collapse = ", "),
+    title = paste(names(by_env), collapse = ", "),
     subtitle = c(
       if (length(shown) < length(groups)) {
         paste("the", length(shown), "of", length(groups), "policies with the highest mean returns")
       },
-      paste(paste(vapply(counts, whole_number_text, ""), collapse = " to "), "episodes each")
+      episodes_each(lengths(shown)), if (length(by_env) > 1L) "dashed: median"
     )
   )
+}
+
+episodes_each <- function(counts) {
+  counts <- vapply(unique(range(counts)), whole_number_text, "")
+  paste(paste(counts, collapse = " to "), "episodes each")
 }
 
 #' Split the returns of a rollout by candidate

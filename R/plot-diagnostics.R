@@ -16,7 +16,13 @@ diagnostics_picture <- function(x, call = rlang::caller_env()) {
   rows$name <- factor(rows$name, names)
   # Random episodes, which only supplied the first moments of observations, taught nothing.
   rows <- rows[is.finite(rows$value), ]
+  # A number that stays the same would lie on an axis from half below it to half above it, where
+  # that of a small one seems to be 0.
+  spread <- stats::ave(rows$value, as.character(rows$name), FUN = function(x) diff(range(x)))
+  constant <- rows[spread == 0, ]
   ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +
+    ggplot2::geom_blank(ggplot2::aes(y = 0.5 * .data$value), constant) +
+    ggplot2::geom_blank(ggplot2::aes(y = 1.5 * .data$value), constant) +
     ggplot2::geom_line(colour = gym_colours[["blue"]], linewidth = 0.6) +
     ggplot2::geom_point(colour = gym_colours[["blue"]], size = 0.6) +
     ggplot2::facet_wrap(ggplot2::vars(.data$name), scales = "free_y", ncol = 2L) +

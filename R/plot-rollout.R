@@ -3,6 +3,7 @@
 #' There are three pictures of a rollout: the distribution of the returns of all episodes, the
 #' observations and actions of one episode, and the frames of one episode. Several rollouts, or one
 #' of several policies, are compared: a row for each policy shows the distribution of its returns.
+#' Each environment has a column of its own.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.

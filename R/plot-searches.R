@@ -42,7 +42,7 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
       values = c(`FALSE` = gym_colours[["sky"]], `TRUE` = gym_colours[["blue"]]), guide = "none"
     ) +
     ggplot2::scale_x_continuous(
-      breaks = c(at, unsolved$x), labels = c(at, rep("not\nsolved", nrow(unsolved)))
+      breaks = c(at, unsolved$x), labels = c(axis_numbers(at), rep("not\nsolved", nrow(unsolved)))
     ) +
     ggplot2::scale_y_continuous(breaks = function(limits) unique(round(pretty(limits)))) +
     picture_labels(

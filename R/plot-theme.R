@@ -127,21 +127,24 @@ continuous_fill <- function(name, colours, ...) {
   )
 }
 
-target_label <- function(target) paste("target", number_text(target))
+# The targets of several environments have one place in the key.
+target_label <- function(target) {
+  paste(c("target", if (length(target) == 1L) number_text(target)), collapse = " ")
+}
 
-# The line of the target, if there is one.
-target_line <- function(target) {
-  if (!is.null(target)) {
+# The line of the target, if there is one, or one for each environment.
+target_line <- function(target, ...) {
+  if (length(target)) {
     ggplot2::geom_hline(
       ggplot2::aes(yintercept = .data$target, colour = .data$key),
-      data.frame(target = target, key = target_label(target)), linetype = "dashed",
+      data.frame(target = target, key = target_label(target), ...), linetype = "dashed",
       linewidth = 0.7
     )
   }
 }
 
 target_mark <- function(target) {
-  if (!is.null(target)) {
+  if (length(target)) {
     stats::setNames(list(key_mark("ink", line = "dashed")), target_label(target))
   }
 }
@@ -150,9 +153,10 @@ finite_target <- function(target) if (!is.null(target) && is.finite(target)) tar
 
 # Axes ----------------------------------------------------------------------------------
 
-number_axis <- function(scale, ...) {
-  scale(labels = function(at) ifelse(is.na(at), NA, number_text_each(at)), ...)
-}
+number_axis <- function(scale, ...) scale(labels = axis_numbers, ...)
+
+# All numbers of an axis have one form.
+axis_numbers <- function(at) ifelse(is.na(at), NA, number_text(at, trim = TRUE))
 
 # The panels' titles, one line each if they fit half of four inches.
 wrapped_strips <- function(columns = 2) ggplot2::label_wrap_gen(66 %/% columns)

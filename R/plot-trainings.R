@@ -5,7 +5,7 @@
 #' Show the returns of the agents' own policies over the steps of the environment. For trainings
 #' with several seeds ([gym_trainings]), the line is the median of the seeds and the band their
 #' middle half. For a single training, the line connects its evaluations. The dashed line is the
-#' target. Several trainings are compared in one picture.
+#' target. Several trainings are compared in one picture, which has a panel for each environment.
 #'
 #' Between two evaluations the return is interpolated linearly. The line of several seeds is thick
 #' while all of them train. It becomes thin when the first one ends; a seed that has ended counts
@@ -39,19 +39,23 @@ autoplot.gym_trainings <- function(object, ...) {
 
 trainings_picture <- function(trainings, call = rlang::caller_env()) {
   each <- Map(evaluation_curves, trainings, names(trainings), list(call))
-  last <- max(vapply(unlist(each, recursive = FALSE), function(curve) max(curve$steps), 0))
-  curves <- do.call(rbind, Map(trainings_curve, each, names(trainings), last))
-  curves$label <- factor(curves$label, names(trainings))
-  target <- common_target(trainings)
-  alone <- curves[curves$label %in% names(which(table(curves$label) == 1L)), ]
+  labels <- unique(names(trainings))
+  ids <- vapply(trainings, function(x) x$env_id, "")
+  ids <- factor(ids, unique(ids))
+  ends <- vapply(each, function(curves) max(unlist(lapply(curves, `[[`, "steps"))), 0)
+  last <- stats::ave(ends, ids, FUN = max)
+  curves <- do.call(rbind, Map(trainings_curve, each, names(trainings), last, seq_along(ids)))
+  curves$env_id <- ids[curves$training]
+  curves$label <- factor(curves$label, labels)
+  # One for each environment.
+  target <- unlist(lapply(split(trainings, ids), common_target))
   seeds <- any(vapply(trainings, inherits, NA, "gym_trainings"))
-  marks <- line_marks(names(trainings))
   ggplot2::ggplot(curves, ggplot2::aes(.data$steps, colour = .data$label)) +
     ggplot2::geom_ribbon(
       ggplot2::aes(ymin = .data$lower, ymax = .data$upper, fill = .data$label), alpha = 0.25,
       linetype = "blank", show.legend = FALSE
     ) +
-    target_line(target) +
+    target_line(target, env_id = factor(names(target), levels(ids))) +
     ggplot2::geom_line(
       ggplot2::aes(y = .data$median), lines_of(curves, !curves$ended), linewidth = 0.8
     ) +
@@ -61,11 +65,12 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     ) +
     # A line of one point is invisible.
     ggplot2::geom_pointrange(
-      ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper), alone,
-      show.legend = FALSE
+      ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper),
+      curves[points_each(curves) == 1, ], show.legend = FALSE
     ) +
-    ggplot2::scale_fill_manual(values = named_colours(names(trainings)), guide = "none") +
-    key_of_marks(c(marks, target_mark(target))) +
+    (if (nlevels(ids) > 1L) ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free")) +
+    ggplot2::scale_fill_manual(values = named_colours(labels), guide = "none") +
+    key_of_marks(c(line_marks(labels), target_mark(target))) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
     picture_labels(
       trainings_title(trainings),
@@ -76,11 +81,13 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     theme_gym()
 }
 
-# The rows of labels with more than one point.
+# The rows of trainings with more than one point.
 lines_of <- function(curves, rows) {
   curves <- curves[rows, ]
-  curves[curves$label %in% names(which(table(curves$label) > 1L)), ]
+  curves[points_each(curves) > 1, ]
 }
+
+points_each <- function(curves) stats::ave(curves$steps, curves$training, FUN = length)
 
 ended_caption <- function(seeds) {
   if (seeds) {
@@ -121,12 +128,13 @@ evaluation_curve <- function(training) {
 
 #' Compute the line and the band of one training or several seeds
 #' @param each The result of [evaluation_curves()].
-#' @param last Where the picture ends, in steps.
-#' @return A data frame with a row for each place: `label`, `steps`, `median`, `lower`, `upper` of
-#'   the seeds, `ended`, whether a seed had ended before, and `first_end`, the place where the first
-#'   one ended.
+#' @param last Where the panel ends, in steps.
+#' @param training The number of the training.
+#' @return A data frame with a row for each place: `label`, `training`, `steps`, `median`, `lower`,
+#'   `upper` of the seeds, `ended`, whether a seed had ended before, and `first_end`, the place
+#'   where the first one ended.
 #' @noRd
-trainings_curve <- function(each, label, last) {
+trainings_curve <- function(each, label, last, training) {
   from <- max(vapply(each, function(curve) min(curve$steps), 0))
   ends <- vapply(each, function(curve) max(curve$steps), 0)
   first_end <- max(from, min(ends))
@@ -147,8 +155,9 @@ trainings_curve <- function(each, label, last) {
   values <- matrix(values, nrow = length(steps))
   quantile <- function(p) apply(values, 1L, stats::quantile, probs = p, names = FALSE)
   data.frame(
-    label = label, steps = steps, median = quantile(0.5), lower = quantile(0.25),
-    upper = quantile(0.75), ended = steps > first_end, first_end = first_end, row.names = NULL
+    label = label, training = training, steps = steps, median = quantile(0.5),
+    lower = quantile(0.25), upper = quantile(0.75), ended = steps > first_end,
+    first_end = first_end, row.names = NULL
   )
 }
 

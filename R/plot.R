@@ -3,12 +3,13 @@
 
 show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL) {
   arguments <- arguments_as_written(quote(x))
-  # Pass results as variables: a name such as `episode` would be taken for an argument of
-  # autoplot().
-  named <- vapply(arguments, is_comparable, NA)
+  # Results are passed as variables that know their names: an argument with a name such as `episode`
+  # would be taken for one of autoplot().
+  named <- which(vapply(arguments, is_comparable, NA))
   names(arguments) <- rlang::names2(arguments)
-  names <- make.unique(names(arguments)[named], " ")
-  results <- list2env(stats::setNames(arguments[named], names), parent = asNamespace("ggplot2"))
+  labelled <- Map(structure, arguments[named], label = names(arguments)[named])
+  names <- paste0("result", named, recycle0 = TRUE)
+  results <- list2env(stats::setNames(labelled, names), parent = asNamespace("ggplot2"))
   arguments[named] <- lapply(names, as.name)
   names(arguments)[named] <- ""
   picture <- naming_own_call(eval(as.call(c(quote(autoplot), arguments)), results), "autoplot")
@@ -33,6 +34,10 @@ plot.gym_comparison <- show_picture
 #' @rdname plot.gym_decision_map
 #' @export
 plot.gym_decision_map <- show_picture
+
+#' @rdname plot.gym_evaluation
+#' @export
+plot.gym_evaluation <- show_picture
 
 #' @rdname plot.gym_frame
 #' @export

@@ -27,8 +27,8 @@ arguments_as_written <- function(first, frame = rlang::caller_env(), call = fram
 name_results <- function(values, written) {
   names <- rlang::names2(values)
   for (i in which(!nzchar(names))) {
-    variable <- is.name(written[[i]])
-    names[[i]] <- if (variable) as.character(written[[i]]) else result_label(values[[i]])
+    names[[i]] <- attr(values[[i]], "label") %||%
+      if (is.name(written[[i]])) as.character(written[[i]]) else result_label(values[[i]])
   }
   stats::setNames(values, names)
 }
@@ -52,13 +52,18 @@ result_label <- function(x) {
 training_label <- function(x) sub(":.*", "", format(x$agent))
 
 #' Return the results among the arguments of a picture; any other argument is an error
+#' @param unique Make the names different within each environment, which has a panel?
 #' @return The results, a list with names.
 #' @noRd
 only_results <- function(values, class, call = rlang::caller_env(), unique = TRUE) {
   are <- vapply(values, inherits, NA, class)
   rlang::exec(check_dots_empty, !!!values[!are], call = call)
-  if (unique) names(values) <- make.unique(rlang::names2(values), " ")
-  values[are]
+  values <- values[are]
+  if (unique) {
+    ids <- vapply(values, function(x) x$env_id %||% "", "")
+    names(values) <- stats::ave(rlang::names2(values), ids, FUN = function(x) make.unique(x, " "))
+  }
+  values
 }
 
 given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {

@@ -7,20 +7,24 @@ kept_rules <- c("iterations", "total_steps", "max_steps", "eval_every", "eval_ep
 
 #' Name the differences between trainings in one environment
 #' @param trainings A list of trainings, or of trainings with many seeds, with names.
-#' @return A string for each kind of difference, such as `"targets differ: A 475; B 490"`.
+#' @return A string for each kind of difference, such as `"targets differ: A: 475; B: 490"`. With
+#'   several environments it names the one, as in `"targets differ in CartPole-v1: ..."`.
 #' @noRd
 unequal_rules <- function(trainings) {
   by_env <- split(trainings, vapply(trainings, function(x) x$env_id, ""))
-  unlist(lapply(unname(by_env), function(those) {
+  unlist(lapply(names(by_env), function(id) {
+    those <- by_env[[id]]
+    where <- if (length(by_env) > 1L) paste(" in", id)
+    unequal <- function(what, names) unequal_text(paste0(what, " differ", where), rules, names)
     rules <- lapply(those, function(x) {
       one <- each_training(x)[[1L]]
       c(list(target = one$target %||% Inf), one$rules, environment_settings(one))
     })
     c(
-      unequal_text("targets", rules, "target"),
-      unequal_text("budgets", rules, c("total_steps", "iterations")),
-      unequal_text("environments", rules, c("arguments", "wrappers")),
-      unequal_text("rules of evaluation", rules, kept_rules[-(1:2)])
+      unequal("targets", "target"),
+      unequal("budgets", c("total_steps", "iterations")),
+      unequal("environments", c("arguments", "wrappers")),
+      unequal("rules of evaluation", kept_rules[-(1:2)])
     )
   }))
 }
@@ -52,6 +56,6 @@ unequal_text <- function(what, rules, names) {
     texts <- vapply(rules, function(of_one) {
       toString(vapply(differ, value, "", of_one = of_one))
     }, "")
-    paste0(what, " differ: ", paste0(names(rules), ": ", texts, collapse = "; "))
+    paste0(what, ": ", paste0(names(rules), ": ", texts, collapse = "; "))
   }
 }

@@ -24,9 +24,9 @@
 #'   }
 #'   `as.data.frame()` returns a row for each seed: `seed` (whole number), `stopped_early`
 #'   (logical), `iterations` (integer), `steps` (double), `mean_return`, `se`, `lower`, `upper` (of
-#'   the final evaluation, doubles), `reached` (logical: has this mean return, or a round by the
-#'   tutorial's rule, reached the target? `NA` without a target, and with `target = Inf`),
-#'   `elapsed` (seconds, a double), `interrupted` (logical).
+#'   the final evaluation, doubles), `reached` (logical: has this mean return, or a round of a
+#'   search, reached the target? `NA` without a target, and with `target = Inf`), `elapsed`
+#'   (seconds, a double), `interrupted` (logical).
 #'
 #'   `coef()` returns the weights of the policies, a matrix with a row for each seed.
 #'

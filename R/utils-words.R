@@ -4,7 +4,8 @@ environment_label <- function(env) env$spec$id %||% "the environment"
 
 count_of <- function(n, noun) paste0(whole_number_text(n), " ", noun, if (n != 1) "s")
 
-number_text <- function(x) marked_text(x, digits = 4L)
+# Without an exponent where a reader can count the digits: 50,000 and 100,000, not 1e+05.
+number_text <- function(x, ...) marked_text(x, digits = 4L, scientific = 3L, ...)
 
 whole_number_text <- function(n) marked_text(n, scientific = FALSE)
 

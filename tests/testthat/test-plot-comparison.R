@@ -63,6 +63,22 @@ test_that("of many policies those with the highest mean returns are shown, and i
   expect_identical(data$subtitle[[1]], "the 10 of 12 policies with the highest mean returns")
 })
 
+test_that("each environment has a column, with axis and bars of its own", {
+  local_device()
+  picture <- plot(
+    random = played_with(many), random = played_with(c(-300, -300, -100), id = "Other-v0"),
+    other = played_with(c(3, 3, 4))
+  )
+  panels <- ggplot2::ggplot_build(picture)$layout$layout
+  expect_identical(unique(as.character(panels$env_id)), c("Fake-v0", "Other-v0"))
+  expect_identical(unique(as.character(panels$label)), c("random", "other"))
+  expect_identical(anyDuplicated(panels$SCALE_X[panels$label == "random"]), 0L)
+  bars <- layers_of(picture, "GeomBar")
+  expect_equal(bars[[1]]$xmax - bars[[1]]$xmin, c(0.8, 0.8))
+  expect_equal(bars[[2]]$xmax - bars[[2]]$xmin, c(160, 160))
+  expect_setequal(layers_of(picture, "GeomVline")[[1]]$xintercept, c(15.5, -300, 3))
+})
+
 test_that("the title names every environment", {
   data <- comparison_plot_data(list(a = played_with(1:3), b = played_with(1:3, id = "Other-v0")))
   expect_identical(data$title, "Fake-v0, Other-v0")

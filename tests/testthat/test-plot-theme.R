@@ -76,3 +76,9 @@ test_that("marks on an axis are whole numbers where some fit", {
     expect_true(length(at) > 0 && all(at == round(at) & at >= 1 & at <= last))
   }
 })
+
+test_that("the numbers of an axis have one form", {
+  expect_identical(axis_numbers(c(0, 50000, 1e5, NA)), c("0", "50,000", "100,000", NA))
+  expect_identical(axis_numbers(c(0, 2.5, 5)), c("0.0", "2.5", "5.0"))
+  expect_identical(axis_numbers(c(5e11, 1e12)), c("5e+11", "1e+12"))
+})

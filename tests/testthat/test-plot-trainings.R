@@ -103,6 +103,42 @@ test_that("a comparison names other budgets and rules of evaluation", {
   expect_null(autoplot(short, elsewhere)$labels$caption)
 })
 
+test_that("each environment has a panel, in which an agent keeps its name and has its own target", {
+  elsewhere <- function(training) {
+    training$env_id <- "Other-v0"
+    training$target <- 70
+    training
+  }
+  first <- training_of(c(10, 20), c(1, 2), rules = list(total_steps = 20))
+  longer <- training_of(c(10, 30), c(1, 3), rules = list(total_steps = 30), agent = agent_cem())
+  second <- elsewhere(training_of(c(100, 300), c(50, 60), rules = list(total_steps = 300)))
+  local_device()
+  pictures <- list(
+    drawn(autoplot(ARS = first, CEM = longer, ARS = second)),
+    plot(ARS = first, CEM = longer, ARS = second),
+    autoplot(list(first)[[1]], CEM = longer, list(second)[[1]])
+  )
+  for (picture in pictures) {
+    expect_identical(levels(picture$data$label)[2], "CEM")
+    expect_length(levels(picture$data$label), 2)
+    panels <- ggplot2::ggplot_build(picture)$layout$layout
+    expect_identical(as.character(panels$env_id), c("Fake-v0", "Other-v0"))
+    lines <- layers_of(picture, "GeomLine")[[1]]
+    expect_identical(range(lines$x[lines$PANEL == 2]), c(100, 300))
+    expect_identical(unique(lines$colour[lines$PANEL == 2]), series_colours[[1]])
+    targets <- layers_of(picture, "GeomHline")[[1]]
+    expect_identical(targets$yintercept[order(targets$PANEL)], c(5, 70))
+    expect_match(picture$labels$caption, "budgets differ in Fake-v0: ", fixed = TRUE)
+    # A line is thin from its end to that of its own panel.
+    expect_lte(max(layers_of(picture, "GeomLine")[[2]]$x), 300)
+    thin <- layers_of(picture, "GeomLine")[[2]]
+    expect_identical(max(thin$x[thin$PANEL == 1]), 30)
+  }
+  expect_identical(key_of(pictures[[1]]), c("ARS", "CEM", "target"))
+  # In one environment two trainings need two names.
+  expect_identical(levels(autoplot(ARS = first, ARS = first)$data$label), c("ARS", "ARS 1"))
+})
+
 test_that("a curve begins before the first iteration", {
   trained <- training_of(c(10, 20), c(4, 6))
   trained$evaluations <- rbind(data.frame(iteration = 0, kind = "curve", mean_return = 1),

@@ -1,5 +1,6 @@
 test_that("numbers are rounded for printing, one by one where they stand apart", {
   expect_identical(number_text(12345.678), "12,346")
+  expect_identical(number_text_each(c(5e4, 1e5, 1e12)), c("50,000", "100,000", "1e+12"))
   expect_identical(number_text_each(c(a = 1, b = 0.125)), c("1", "0.125"))
   expect_identical(percent_text(0.331), "33%")
   expect_identical(se_text(0.5), " (standard error 0.5)")
