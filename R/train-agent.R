@@ -129,8 +129,8 @@
 #'     \item{policy}{The agent's policy with its final weights, as it was evaluated.
 #'       `agent_policy(training$agent)` draws its actions if the agent's policy does.}
 #'     \item{agent}{The agent at the end.}
-#'     \item{solved}{Whether the final evaluation, or a round by the tutorial's rule, has reached the
-#'       target, a logical. `NA` without a target, and with `target = Inf`.}
+#'     \item{solved}{Whether the final evaluation, or a round by the tutorial's rule, has reached
+#'       the target, a logical. `NA` without a target, and with `target = Inf`.}
 #'     \item{stopped_early}{Whether training ended before its budget because a stopping evaluation,
 #'       or a round, reached the target, a logical.}
 #'     \item{history}{A data frame with a row for each iteration: `iteration` (integer), `steps` (of
