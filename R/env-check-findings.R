@@ -289,8 +289,7 @@ look_at_copies <- function(check, first, seed) {
 # The objects that copies share, as far as the functions show.
 shared_text <- function(definition) {
   used <- unique(unlist(lapply(definition[c("reset", "step")], function(f) all.names(body(f)))))
-  place <- list2env(as.list(definition$parameters), parent = environment(definition$step) %||%
-                      globalenv())
+  place <- environment(definition$step) %||% globalenv()
   shared <- Filter(function(name) is_playable(get0(name, place)), used)
   if (!length(shared)) {
     return("Keep the state of an episode in `self`, not outside it.")

@@ -42,7 +42,8 @@
 #' @param observation_space,action_space The spaces, such as `space_box(-1, 1, shape = 2)` and
 #'   `space_discrete(3)`.
 #' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
-#'   `self$size`. In a vectorised environment `num_envs` is the number of sub-environments of this
+#'   `self$size`. An environment of R or an object of R6 is refused, also in a list, because all
+#'   sub-environments would share it: make it in `reset`. In a vectorised environment `num_envs` is the number of sub-environments of this
 #'   object, 256 by default.
 #' @param render A function of `self` that draws the environment. It plots with R's graphics, or
 #'   returns a picture: a raster image, a matrix of greys or of colours, or an array of height x
@@ -119,6 +120,7 @@ gym_env <- function(reset, step, observation_space, action_space, ..., render = 
   }
   parameters <- list(...)
   check_dots_named(parameters, "size = 5")
+  check_not_shared(parameters)
   # A missing space raises the same error as NULL.
   if (missing(observation_space)) observation_space <- NULL
   if (missing(action_space)) action_space <- NULL

@@ -47,6 +47,8 @@ gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_
   check_entry_point(entry_point)
   arguments <- list(...)
   check_dots_named(arguments, "size = 5")
+  check_not_shared(arguments)
+  check_fields_not_shared(entry_point, rlang::current_env())
   check_count(max_episode_steps, allow_null = TRUE)
   check_number(reward_threshold, allow_null = TRUE)
   if (inherits(entry_point, "gym_function_env")) {
@@ -122,6 +124,7 @@ make_entry <- function(id, arguments, call) {
     changes["max_episode_steps"] <- list(own_limit(arguments$max_episode_steps, call))
     arguments$max_episode_steps <- NULL
   }
+  check_not_shared(arguments, call = call)
   given <- registered$arguments
   given[names(arguments)] <- arguments
   entry_point <- registered$entry_point
@@ -251,12 +254,22 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
   envs <- list(env)
   another <- function() {
     made <- make_registered(id, arguments, call)
+    if (any(vapply(envs, identical, NA, made))) abort_made_once(id, call)
     envs[[length(envs) + 1L]] <<- made
     sub_env_of(made)
   }
   vector_env <- r_vector_env(env, num_envs, max_envs, frames, another, call)
   vector_env$close <- function(wait = TRUE) for (env in envs) env$close()
   vector_env
+}
+
+abort_made_once <- function(id, call) {
+  gym_abort(
+    c(paste0("The `entry_point` of ", bare_id(id), " returned the same object twice, which all ",
+             "sub-environments would share."),
+      i = "Let it make another one in each call, such as by `$new()`."),
+    class = "gym_error_argument", argument = "entry_point", call = call
+  )
 }
 
 # In the registry ----------------------------------------------------------------------
