@@ -118,12 +118,11 @@ evaluation_curves <- function(x, label, call) {
   each
 }
 
-# The evaluations of a training. Of several at one place, the last counts, which had the most
-# episodes.
+# The evaluations of a training.
 evaluation_curve <- function(training) {
-  steps <- evaluation_steps(training)
-  last <- !duplicated(steps, fromLast = TRUE)
-  data.frame(steps = steps[last], mean_return = training$evaluations$mean_return[last])
+  data.frame(
+    steps = evaluation_steps(training), mean_return = training$evaluations$mean_return
+  )
 }
 
 #' Compute the line and the band of one training or several seeds
@@ -144,14 +143,7 @@ trainings_curve <- function(each, label, last, training) {
     seq(min(from, max(ends)), max(ends), length.out = curve_places)
   }
   steps <- sort(unique(c(steps, first_end, if (length(steps) > 1L) last)))
-  values <- vapply(each, function(curve) {
-    # A single evaluation stays as it is.
-    if (nrow(curve) == 1L) {
-      rep(curve$mean_return, length(steps))
-    } else {
-      stats::approx(curve$steps, curve$mean_return, steps, rule = 2L)$y
-    }
-  }, numeric(length(steps)))
+  values <- vapply(each, returns_at, numeric(length(steps)), steps)
   values <- matrix(values, nrow = length(steps))
   quantile <- function(p) apply(values, 1L, stats::quantile, probs = p, names = FALSE)
   data.frame(

@@ -58,12 +58,7 @@ run_scores <- function(trainings, curves, steps, call) {
     )
   }
   score <- vapply(of_run, function(run) {
-    run <- run[!duplicated(run$steps, fromLast = TRUE), ]
-    if (by_end || nrow(run) == 1L) {
-      run$mean_return[[which.max(run$steps)]]
-    } else {
-      stats::approx(run$steps, run$mean_return, at, rule = 2L)$y
-    }
+    returns_at(run, if (by_end) max(run$steps) else at)
   }, 0)
   runs <- do.call(rbind, lapply(of_run, function(run) run[1L, c("training", "env_id", "seed")]))
   list(

@@ -5,7 +5,7 @@ read_curves <- function(path, call) {
     gym_abort(paste0("There is no file or folder \"", path, "\"."), class = "gym_error_argument",
               argument = "...", value = path, call = call)
   }
-  rows <- if (dir.exists(path)) folder_curves(path) else file_curves(path)
+  rows <- read_logs(path, call)[[1L]]
   if (is.null(rows)) {
     gym_abort(
       c(paste0("\"", path, "\" has no log of a training."),
@@ -21,27 +21,61 @@ read_curves <- function(path, call) {
   rows[names(no_curve)]
 }
 
+#' Read files or folders, each by itself
+#'
+#' A crash may leave a damaged file, which must not hide the others: it is warned of. If all are
+#' damaged, the first one is an error.
+#' @return A list of what `read` returned for those that are not damaged.
+#' @noRd
+read_logs <- function(paths, call, read = function(path) path_curves(path, call)) {
+  each <- lapply(paths, function(path) {
+    tryCatch(
+      tryCatch(read(path), error = function(cnd) abort_damaged(path, cnd, call)),
+      gym_error_argument = identity
+    )
+  })
+  damaged <- vapply(each, inherits, NA, "gym_error_argument")
+  if (length(each) && all(damaged)) rlang::cnd_signal(each[[1L]])
+  for (cnd in each[damaged]) {
+    rlang::warn(c(conditionMessage(cnd), i = "It is left out."), class = "gym_warning_log")
+  }
+  each[!damaged]
+}
+
+abort_damaged <- function(path, cnd, call) {
+  if (inherits(cnd, "gym_error_argument")) rlang::cnd_signal(cnd)
+  gym_abort(
+    c(paste0("The log \"", path, "\" is damaged."), x = conditionMessage(cnd)),
+    class = "gym_error_argument", argument = "...", value = path, call = call
+  )
+}
+
+path_curves <- function(path, call) {
+  if (dir.exists(path)) {
+    return(folder_curves(path, call))
+  }
+  table <- file_table(path)
+  if (has_episodes(table)) monitor_curves(table, path) else table
+}
+
 # The rows of a folder or of those below it, `NULL` if there is no log; `run` identifies the run.
-folder_curves <- function(path) {
+folder_curves <- function(path, call) {
   inside <- function(name) file.path(path, name)
   if (file.exists(inside("config.json")) && file.exists(inside("evaluations.csv"))) {
     return(own_curves(path))
   }
-  progress <- if (file.exists(inside("progress.csv"))) file_curves(inside("progress.csv"))
-  if (any(progress$kind == "curve")) {
-    return(progress)
-  }
-  monitors <- list.files(path, "monitor[.]csv$", full.names = TRUE)
-  if (length(monitors)) {
-    return(monitor_curves(monitors, path))
-  }
-  if (!is.null(progress)) {
-    return(progress)
+  files <- c(inside("progress.csv"), list.files(path, "monitor[.]csv$", full.names = TRUE))
+  tables <- read_logs(files[file.exists(files)], call, file_table)
+  of_monitor <- vapply(tables, has_episodes, NA)
+  progress <- do.call(rbind, tables[!of_monitor])
+  episodes <- if (any(of_monitor)) monitor_curves(do.call(rbind, tables[of_monitor]), path)
+  kinds <- list(if (any(progress$kind == "curve")) progress, episodes, progress)
+  found <- Find(NROW, kinds) %||% Find(Negate(is.null), kinds)
+  if (!is.null(found)) {
+    return(found)
   }
   below <- c(list.files(path, "[.]csv$", full.names = TRUE), list.dirs(path, recursive = FALSE))
-  do.call(rbind, lapply(below, function(one) {
-    if (dir.exists(one)) folder_curves(one) else file_curves(one)
-  }))
+  do.call(rbind, read_logs(setdiff(below, files), call))
 }
 
 own_curves <- function(path) {
@@ -57,19 +91,17 @@ is_text <- function(file) {
   !any(readBin(opened, "raw", 1000L) == as.raw(0L))
 }
 
-# The first line identifies the kind of file.
-file_curves <- function(file) {
-  if (!is_text(file)) {
+# The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies the
+# kind of file.
+file_table <- function(file) {
+  lines <- if (is_text(file)) readLines(file, warn = FALSE)
+  if (!length(lines)) {
     return(NULL)
   }
-  first <- readLines(file, 1L, warn = FALSE)
-  if (!length(first)) {
-    return(NULL)
+  if (startsWith(lines[[1L]], "#")) {
+    return(monitor_episodes(lines))
   }
-  if (startsWith(first, "#")) {
-    return(monitor_curves(file, file))
-  }
-  table <- utils::read.csv(file, check.names = FALSE)
+  table <- utils::read.csv(text = lines, check.names = FALSE)
   if ("time/total_timesteps" %in% names(table)) {
     progress_curves(table, file)
   } else {
@@ -83,23 +115,29 @@ progress_curves <- function(table, file) {
   value <- table[[if (evaluated) "eval/mean_reward" else "rollout/ep_rew_mean"]]
   rows <- data.frame(
     steps = table[["time/total_timesteps"]], mean_return = value %||% rep(NA_real_, nrow(table)),
-    kind = if (evaluated) "curve" else "training"
+    kind = rep(if (evaluated) "curve" else "training", nrow(table))
   )
-  run_rows(dirname(file), rows[!is.na(rows$mean_return), ])
+  run_rows(dirname(file), rows)
 }
 
-# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode.
-# Parallel environments have a file each.
-monitor_curves <- function(files, path) {
-  each <- lapply(files, function(file) {
-    about <- jsonlite::fromJSON(sub("^#", "", readLines(file, 1L)))
-    rows <- utils::read.csv(file, skip = 1L)
-    rows$time <- rows$t + about$t_start
-    rows$env_id <- rep(about$env_id %||% NA_character_, nrow(rows))
-    rows[c("r", "l", "time", "env_id")]
-  })
-  episodes <- do.call(rbind, each)
-  episodes <- episodes[order(episodes$time), ]
+# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. A
+# resumed file has the start of its first session in that line, and in each session time begins anew.
+monitor_episodes <- function(lines) {
+  about <- jsonlite::fromJSON(sub("^#", "", lines[[1L]]))
+  rows <- utils::read.csv(text = c(lines[-1L], if (length(lines) == 1L) "r,l,t"))
+  rows <- list2DF(lapply(rows[c("r", "l", "t")], log_numbers))
+  rows <- rows[stats::complete.cases(rows), ]
+  rows$session <- cumsum(diff(c(-Inf, rows$t)) < 0)
+  rows$time <- rows$t + about$t_start
+  rows$env_id <- rep(about$env_id %||% NA_character_, nrow(rows))
+  rows
+}
+
+has_episodes <- function(table) "session" %in% names(table)
+
+# Parallel environments have a file each. Within a file episodes stay in their order.
+monitor_curves <- function(episodes, path) {
+  episodes <- episodes[order(episodes$session, episodes$time), ]
   rows <- data.frame(
     steps = cumsum(as.numeric(episodes$l)), mean_return = episodes$r,
     kind = rep("training", nrow(episodes)), episodes = rep(1L, nrow(episodes))
@@ -127,8 +165,12 @@ cleanrl_curves <- function(table, file) {
 }
 
 training_rows <- function(steps, value) {
-  rows <- data.frame(steps = steps, mean_return = value, kind = "training")
-  rows[!is.na(rows$mean_return), ]
+  data.frame(steps = steps, mean_return = value, kind = rep("training", length(steps)))
+}
+
+log_numbers <- function(x) {
+  if (!is.numeric(x) && !all(is.na(x))) rlang::abort("A column of numbers has text.")
+  as.numeric(x)
 }
 
 # A run with all columns. If the log lacks a value, it is taken from the name of the run: CleanRL's
@@ -143,10 +185,14 @@ run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
   if (grepl("seed[-_=]?[0-9]", name)) {
     seed <- seed %||% sub(".*seed[-_=]?([0-9]+).*", "\\1", name)
   }
+  rows[c("steps", "mean_return")] <- lapply(rows[c("steps", "mean_return")], log_numbers)
+  # Rows of other numbers have none, and a line that was being written at a crash.
+  rows <- rows[!is.na(rows$steps) & !is.na(rows$mean_return), ]
   missing <- setdiff(names(no_curve), names(rows))
   rows[missing] <- lapply(no_curve[missing], function(none) rep(none[NA_integer_], nrow(rows)))
   rows$env_id <- rep(env_id %||% NA_character_, nrow(rows))
   rows$seed <- rep(as.numeric(seed %||% NA), nrow(rows))
-  rows[c("steps", "mean_return")] <- lapply(rows[c("steps", "mean_return")], as.numeric)
-  cbind(rows[names(no_curve)], run = rep(run, nrow(rows)))
+  # A table without rows has logical columns.
+  rows <- if (nrow(rows)) rows[names(no_curve)] else no_curve
+  cbind(rows, run = rep(run, nrow(rows)))
 }

@@ -83,6 +83,98 @@ test_that("logs of Stable-Baselines3 are read", {
   expect_identical(learning_curves(inside("progress.csv"))$kind, "training")
 })
 
+test_that("the episodes of a Monitor's file stay in their order, also where it was resumed", {
+  folder <- withr::local_tempdir()
+  file <- file.path(folder, "0.monitor.csv")
+  header <- "#{\"t_start\": 100.0, \"env_id\": \"CartPole-v1\"}"
+  # A resumed file has no new header, and its clock begins at 0.
+  writeLines(c(header, "r,l,t", "10,10,5", "20,20,9", "30,30,1", "40,40,6"), file)
+  expect_identical(learning_curves(file)$mean_return, c(10, 20, 30, 40))
+  expect_identical(learning_curves(file)$steps, c(10, 30, 60, 100))
+  # Parallel environments were resumed together.
+  writeLines(c(header, "r,l,t", "11,11,6", "21,21,8", "31,31,2"),
+             file.path(folder, "1.monitor.csv"))
+  expect_identical(learning_curves(folder)$mean_return, c(10, 11, 21, 20, 30, 31, 40))
+})
+
+test_that("a log without rows has none, and a damaged one is an error, or left out beside others", {
+  folder <- withr::local_tempdir()
+  write <- function(lines, ...) {
+    file <- file.path(folder, ...)
+    dir.create(dirname(file), showWarnings = FALSE, recursive = TRUE)
+    writeLines(lines, file)
+    file
+  }
+  monitor <- "#{\"t_start\": 100.0, \"env_id\": null}"
+  empty <- list(
+    write(c(monitor, "r,l,t"), "a", "monitor.csv"), write(monitor, "b", "monitor.csv"),
+    write("time/total_timesteps,rollout/ep_rew_mean", "c", "progress.csv"),
+    write("time/total_timesteps,eval/mean_reward", "d", "progress.csv"),
+    write("Wall time,Step,Value", "e", "run.csv"),
+    write("_step,charts/episodic_return", "f", "history.csv")
+  )
+  for (file in empty) {
+    for (path in c(file, dirname(file))) {
+      expect_identical(learning_curves(path), learning_curves(), info = path)
+    }
+  }
+  config <- write("{\"env\": \"A\", \"seed\": 1}", "own", "config.json")
+  evaluations <- "\"iteration\",\"steps\",\"kind\",\"mean_return\""
+  write(evaluations, "own", "evaluations.csv")
+  expect_identical(learning_curves(dirname(config)), learning_curves())
+  damaged <- list(
+    write(c("#{\"t_sta", "r,l,t", "1,1,1"), "g", "monitor.csv"),
+    write(c(monitor, "r,l", "1,1"), "h", "monitor.csv"),
+    write(c(monitor, "r,l,t", "1,x,1"), "i", "monitor.csv"),
+    write(c("time/total_timesteps,eval/mean_reward", "10,word"), "j", "progress.csv"),
+    write(c("Wall time,Step,Value", "1,2,3,4,5,6", "1"), "k", "run.csv")
+  )
+  for (file in damaged) {
+    for (path in c(file, dirname(file))) {
+      expect_error(learning_curves(path), class = "gym_error_argument", info = path)
+    }
+  }
+  write("{", "own", "config.json")
+  expect_error(learning_curves(dirname(config)), "is damaged", class = "gym_error_argument")
+  write(character(), "l", "monitor.csv")
+  expect_error(learning_curves(file.path(folder, "l")), "no log", class = "gym_error_argument")
+  # A valid neighbour is still read: a folder, a file, and another kind of file.
+  write(c(monitor, "r,l,t", "7,3,1", "8"), "m", "monitor.csv")
+  warned <- capture_warnings(curves <- learning_curves(folder))
+  expect_length(grep("is damaged", warned), 6)
+  expect_identical(curves$mean_return, 7)
+  write(c("time/total_timesteps,eval/mean_reward", "10,word"), "m", "progress.csv")
+  expect_warning(curves <- learning_curves(file.path(folder, "m")), "left out",
+                 class = "gym_warning_log")
+  expect_identical(curves$steps, 3)
+  write("time/total_timesteps,rollout/ep_rew_mean", "m", "progress.csv")
+  expect_identical(learning_curves(file.path(folder, "m"))$steps, 3)
+  write(c("time/total_timesteps,rollout/ep_rew_mean", "9,4"), "a", "progress.csv")
+  expect_identical(learning_curves(file.path(folder, "a"))$mean_return, 4)
+})
+
+test_that("curves are returned on a common grid of steps", {
+  ars <- quiet_trainings()
+  curves <- learning_curves(ars)
+  at <- c(0, 100, 1e6)
+  grid <- learning_curves(ars, at = at)
+  expect_identical(names(grid), names(curves))
+  expect_identical(grid$steps, rep(at, 2))
+  expect_identical(unique(grid$kind), "interpolated")
+  own <- curves[curves$seed == 2, ]
+  last <- own[!duplicated(own$steps, fromLast = TRUE), ]
+  expect_identical(grid$mean_return[grid$seed == 2],
+                   stats::approx(last$steps, last$mean_return, at, rule = 2)$y)
+  expect_identical(grid$mean_return[[6]], own$mean_return[[nrow(own)]])
+  # Before the first evaluation there is no value.
+  later <- ars$trainings[[1]]
+  later$evaluations <- later$evaluations[-1, ]
+  at <- min(evaluation_steps(later)) + c(-1, 0, 1)
+  expect_identical(is.na(learning_curves(later, at = at)$mean_return), c(TRUE, FALSE, FALSE))
+  expect_identical(nrow(learning_curves(at = at)), 0L)
+  expect_error(learning_curves(ars, at = "all"), class = "gym_error_argument")
+})
+
 test_that("CSV files of CleanRL are read", {
   folder <- withr::local_tempdir()
   inside <- function(...) file.path(folder, ...)
