@@ -91,8 +91,8 @@ is_text <- function(file) {
   !any(readBin(opened, "raw", 1000L) == as.raw(0L))
 }
 
-# The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies the
-# kind of file.
+# The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies
+# the kind of file.
 file_table <- function(file) {
   lines <- if (is_text(file)) readLines(file, warn = FALSE)
   if (!length(lines)) {
@@ -120,8 +120,8 @@ progress_curves <- function(table, file) {
   run_rows(dirname(file), rows)
 }
 
-# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. A
-# resumed file has the start of its first session in that line, and in each session time begins anew.
+# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. In a
+# resumed file that line has the start of the first session, and time begins anew in each.
 monitor_episodes <- function(lines) {
   about <- jsonlite::fromJSON(sub("^#", "", lines[[1L]]))
   rows <- utils::read.csv(text = c(lines[-1L], if (length(lines) == 1L) "r,l,t"))
