@@ -90,7 +90,7 @@ agent_start.gym_agent_dqn <- function(agent, policy) {
   check_values(policy, "DQN")
   agent$target <- weight_vector(policy)
   agent$adam <- new_adam(count_weights(policy))
-  agent$updates <- 0
+  agent$updates <- agent$carried <- 0
   agent$memory <- new_memory(agent$memory_size)
   agent
 }

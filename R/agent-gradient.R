@@ -22,6 +22,9 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
     )
   }
   agent <- NextMethod()
+  agent$iteration <- 0L
+  agent$steps <- 0
+  agent$episodes <- agent$min_episodes
   if (is_warming_up(agent)) agent$episodes <- max(agent$min_episodes, warm_up_episodes)
   agent
 }

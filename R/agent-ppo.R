@@ -113,6 +113,7 @@ agent_start.gym_agent_ppo <- function(agent, policy) {
   agent <- NextMethod()
   check_has_log_prob(policy, "PPO")
   agent$value <- value_network(policy)
+  agent$return_moments <- NULL
   agent$adam <- new_adam(count_weights(policy) + count_weights(agent$value))
   agent
 }

@@ -103,15 +103,30 @@ make_and_train <- function(make, frame, ...) {
   kwargs <- dots[!names(dots) %in% of_training]
   preset <- find_preset(sub("agent_", "", make), env, kwargs)
   own <- intersect(of_agent, names(given))
-  arguments <- if (!is.null(preset)) preset_arguments(preset) else list()
+  earlier <- if (!"policy" %in% of_agent) given$policy %||% dots$policy
+  goes_on <- goes_on_from(earlier, paste0("gym_", make))
+  arguments <- if (goes_on) {
+    # An earlier training goes on with its own settings, which defaults do not replace.
+    own <- Filter(function(name) !eval(call("missing", as.name(name)), frame), own)
+    own_arguments(earlier$agent)
+  } else if (!is.null(preset)) {
+    preset_arguments(preset)
+  } else {
+    list()
+  }
   # The preset's `top` was meant for another number of directions, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
   if ("population" %in% own) arguments$elite <- NULL
   arguments[own] <- given[own]
   agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
-  training <- c(given[setdiff(names(given), own)], dots[names(dots) %in% of_training])
-  # The user's budget replaces the preset's.
-  budget <- any(c("iterations", "total_steps") %in% names(training))
+  training <- c(given[setdiff(names(given), of_agent)], dots[names(dots) %in% of_training])
+  # The user's budget replaces the preset's, and that of the earlier training.
+  of_budget <- c("iterations", "total_steps")
+  budget <- any(of_budget %in% names(training))
+  if (goes_on && !budget) {
+    training <- c(training, Filter(Negate(is.null), earlier$rules[of_budget]))
+    budget <- TRUE
+  }
   check_spelling(names(kwargs), c(of_agent, of_training), budget || !is.null(preset), frame)
   if (is.null(preset) && !budget) {
     abort_no_budget(preset_hints(env, kwargs), frame)
@@ -119,6 +134,8 @@ make_and_train <- function(make, frame, ...) {
   if (!is.null(preset)) {
     from_preset <- setdiff(c("episodes", if (!budget) "total_steps"), names(training))
     training[from_preset] <- preset[from_preset]
+  }
+  if (!is.null(preset) && !goes_on) {
     training$policy <- training$policy %||% preset_policy(preset, agent)
     inform_of_preset(preset, env)
     agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]

@@ -52,8 +52,19 @@
 #' `checkpoint` keeps the training in a file. It is written after each iteration, or less often if
 #' iterations are short, so that it takes at most a tenth of the time. The same call resumes the
 #' training, with the same result as an uninterrupted one. A finished training is returned at once.
-#' `iterations` and `total_steps` may differ, except in a search. (A network with given sizes draws
-#' its weights when it is made: make it after [set.seed()], or with the sizes `NA`.)
+#' `iterations`, `total_steps` and `target` may differ, except in a search: a larger budget or a
+#' higher target goes on with a finished training. (A network with given sizes draws its weights
+#' when it is made: make it after [set.seed()], or with the sizes `NA`.) `readRDS()` of the file prints
+#' what it is.
+#'
+#' # Going on with a trained agent
+#'
+#' `train_agent(training$agent, env)` goes on with the agent of an earlier training: its policy,
+#' value network, optimiser, memory and schedules stay as they were. So does `policy = training` in
+#' the function that made this agent, such as [learn_ppo()]. It keeps the agent's settings, except
+#' those that you give, and has the same budget once more by default. It is a new training, with its
+#' own seed, steps and evaluations. `policy = agent_policy(training$agent)` starts with the policy
+#' alone.
 #'
 #' # The tutorial's rule
 #'
@@ -71,7 +82,7 @@
 #' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
 #'   the agent's help page. Most agents start with its weights. A learner such as [agent_q()] makes
 #'   its own policy, and can start with a [policy_table()] of values. Give an earlier training to
-#'   start with its policy.
+#'   go on with its agent, or, by another kind of agent, to start with its policy.
 #' @param iterations,total_steps The number of iterations, or of steps of the environment, after
 #'   which training ends, whole numbers of at least 1. The last iteration is played to its end. Give
 #'   at least one of the two.
@@ -198,12 +209,13 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
 #'   `run`; `in_env`, a function that makes the environment and calls a function with it.
 #' @noRd
 training_job <- function(given, kwargs, client, call) {
-  agent <- given$agent
   env <- given$env
   check_no_steps(names(kwargs), call)
   budget <- !is.null(given$iterations) || !is.null(given$total_steps)
   check_spelling(names(kwargs), names(formals(train_agent)), budget, call)
   solved_by <- check_choice(given$solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
+  search <- solved_by == "candidate"
+  agent <- given$agent <- agent_to_train(given$agent, given$policy, search, call)
   online <- learns_online(agent)
   check_flag(given$model, arg = "model", call = call)
   settings <- c(
@@ -211,11 +223,10 @@ training_job <- function(given, kwargs, client, call) {
             "eval_every", "eval_episodes", "eval_episodes_curve", "seed", "callback")],
     list(
       kwargs = kwargs,
-      # A learner makes its own.
-      policy = trained_policy(given$policy) %||% if (!online) default_policy(agent),
+      policy = policy_to_train(given$policy, agent),
       evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
       # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
-      search = solved_by == "candidate",
+      search = search,
       may_sample = online && given$model
     )
   )
@@ -322,6 +333,7 @@ do_run <- function(run, in_env, max_steps, client, progress, call) {
 # Trains in a given vector environment.
 train_in <- function(vector_env, run, progress, call) {
   settings <- run$settings
+  settings["given_target"] <- list(settings$target)
   settings["target"] <- list(training_target(settings, vector_env$spec))
   settings$env_id <- environment_label(vector_env)
   settings[c("num_envs", "batch_size", "client")] <-
@@ -336,10 +348,15 @@ train_in <- function(vector_env, run, progress, call) {
     bind_with_seed(settings$policy, vector_env, settings$seed, call)
   }
   state <- new_state(settings)
-  state$agent <- with_generator(
-    state$streams$agent, naming_call(agent_start(settings$agent, bound), vector_env)
-  )
-  check_is_agent(state$agent, "agent_start()", call)
+  if (has_started(settings$agent)) {
+    state$agent <- continued_agent(settings$agent, bound, call)
+  } else {
+    state$agent <- with_generator(
+      state$streams$agent, naming_call(agent_start(settings$agent, bound), vector_env)
+    )
+    check_is_agent(state$agent, "agent_start()", call)
+    state$agent$started <- TRUE
+  }
   if (!is.null(run$file)) state$checkpoint <- training_checkpoint(state, run$file, settings, call)
   if (!is.null(run$log)) state$log <- training_log(run$log, settings, state, call)
   run_training(state, vector_env, settings, progress, call)

@@ -43,13 +43,19 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
 #' @noRd
 training_checkpoint <- function(state, file, settings, call) {
   # In addition to the arguments: the settings that the server determines.
-  server <- settings[c("target", "env_id", "num_envs", "batch_size", "from_model")]
+  server <- settings[c(
+    if (settings$search) "target", "env_id", "num_envs", "batch_size", "from_model"
+  )]
   if (!is.null(file$saved)) {
     check_same_server(file$path, file$saved$server, server, call)
     resume_training(state, file$saved, file$path, call)
     # With a larger budget the final evaluation comes later.
     state$final <- NULL
     state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
+    # With a higher target it goes on.
+    if (state$solved && !settings$search && !reaches(stopped_at(state), settings$target)) {
+      state$solved <- state$ended <- FALSE
+    }
     played <- played_text(settings, state)
     inform_resumed("Going on from {.path {file$path}}, after {played}.")
   }
@@ -60,6 +66,7 @@ training_checkpoint <- function(state, file, settings, call) {
     training$agent <- without_memory(training$agent)
     list(
       what = settings$what, arguments = file$arguments, server = server,
+      given_target = settings$given_target, target = settings$target,
       policy = settings$policy, seed = settings$seed, provenance = settings$provenance,
       training = training, streams = saved_streams(state$streams),
       evaluation_streams = saved_streams(state$evaluation_streams),
@@ -67,6 +74,11 @@ training_checkpoint <- function(state, file, settings, call) {
     )
   }, settings$what, call)
   function(last = FALSE) write(now = last)
+}
+
+# The mean return of the evaluation that ended a training.
+stopped_at <- function(state) {
+  utils::tail(Filter(function(row) row$kind == "stopping", state$evaluations), 1L)[[1L]]$mean_return
 }
 
 resume_training <- function(state, saved, path, call = NULL) {
@@ -84,6 +96,10 @@ resume_training <- function(state, saved, path, call = NULL) {
 finished_training <- function(run, client) {
   saved <- run$file$saved
   settings <- run$settings
+  if (!is_same(saved$given_target, settings$target)) {
+    return(NULL)
+  }
+  settings["target"] <- list(saved$target)
   settings[names(saved$server)] <- saved$server
   settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
   state <- rlang::env(started = proc.time()[["elapsed"]])
@@ -109,25 +125,56 @@ inform_resumed <- function(text, .envir = parent.frame()) {
   cli::cli_inform(c(i = text), class = "gym_message_resumed", .envir = .envir)
 }
 
+#' @export
+print.gym_checkpoint <- function(x, ...) {
+  current <- identical(x$format, checkpoint_format)
+  saved <- if (current) unserialize(x$state)
+  training <- saved$training
+  cat(
+    if (is.null(saved)) {
+      paste0("<checkpoint by gym ", x$version, ", which this version cannot read>")
+    } else {
+      c(
+        paste0("<checkpoint of a ", saved$what, " in ", saved$server$env_id, " by ",
+               format(training$agent), ">"),
+        paste0("Seed ", whole_number_text(saved$seed), ", ",
+               count_of(training$iteration, if (saved$what == "search") "round" else "iteration"),
+               ", ", count_of(training$steps, "step"), if (training$ended) ", ended"),
+        "The call that wrote the file resumes from it: give the file as `checkpoint`.",
+        "Its result is a training; this object has none of its elements."
+      )
+    },
+    sep = "\n"
+  )
+  invisible(x)
+}
+
 # The same training --------------------------------------------------------------------
 
-# The arguments that must be the same in two runs of one training. The budget may differ, except in
-# a search, because it determines how rounds are divided into batches.
+# The arguments that must be the same in two runs of one training. The budget and the target may
+# differ, except in a search: they determine how rounds are divided into batches, and which count.
 training_arguments <- function(settings) {
   numbers <- c(
-    "episodes", "target", "max_steps", "eval_every", "eval_episodes", "eval_episodes_curve", "seed"
+    "episodes", if (settings$search) "target", "max_steps", "eval_every", "eval_episodes",
+    "eval_episodes_curve", "seed"
   )
   c(
     list(
       env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
-      # The source of its settings makes no difference.
-      agent = replace(settings$agent, "preset", NULL),
+      agent = comparable_agent(settings$agent),
       policy = comparable_policy(settings$policy, settings$agent)
     ),
     if (settings$search) list(rounds = settings$iterations),
     settings["evaluate"],
     lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
+}
+
+# The source of an agent's settings makes no difference. The memory of one that goes on is large.
+comparable_agent <- function(agent) {
+  agent$preset <- NULL
+  if (inherits(agent$memory, "gym_memory")) agent$memory <- rlang::hash(agent$memory)
+  agent
 }
 
 environment_traits <- function(env) {

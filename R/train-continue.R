@@ -1,0 +1,126 @@
+# Training that goes on with what an earlier training has learned.
+
+# Training marks an agent that has started: it has a policy, and perhaps a value network, the state
+# of its optimiser, or a memory.
+has_started <- function(agent) isTRUE(agent$started)
+
+#' Find the agent that a training starts with
+#'
+#' An agent that was trained before goes on. So does a new agent if `policy` is an earlier training
+#' of the same kind of agent: it takes over everything but the settings. With any other policy the
+#' agent starts again.
+#' @param search Whether candidates are judged by the tutorial's rule; such a search has no past.
+#' @noRd
+agent_to_train <- function(agent, policy, search, call) {
+  if (!search && goes_on_from(policy, class(agent)[[1L]])) {
+    agent <- take_over(policy$agent, agent, call)
+  } else if (search || !is.null(policy)) {
+    agent$started <- NULL
+  }
+  if (has_started(agent)) {
+    check_still_learns(agent, call)
+    cli::cli_inform(
+      c(i = paste("Going on with a trained agent, with all that it has learned. A new one, made by",
+                  "a function such as {.code agent_ppo()}, starts again.")),
+      class = "gym_message_continued"
+    )
+  }
+  agent
+}
+
+# Whether `x` is a training by an agent of this package and class.
+goes_on_from <- function(x, class) {
+  inherits(x, "gym_training") && has_started(x$agent) && class(x$agent)[[1L]] == class &&
+    length(settings_of(x$agent))
+}
+
+# The names of an agent's settings, which are the arguments of the function that makes it.
+settings_of <- function(agent) {
+  make <- get0(sub("^gym_", "", class(agent)[[1L]]), topenv(), "function", inherits = FALSE)
+  names <- names(formals(make))
+  # DQN's argument `memory` is the size of its memory.
+  if ("memory_size" %in% names(agent)) names <- sub("^memory$", "memory_size", names)
+  intersect(names, names(agent))
+}
+
+own_arguments <- function(agent) {
+  arguments <- unclass(agent)[settings_of(agent)]
+  names(arguments) <- sub("memory_size", "memory", names(arguments))
+  arguments
+}
+
+# Settings that determine what an agent keeps of what it has learned.
+lasting_settings <- c("features", "double", "baseline", "version", "importance", "memory_size")
+
+take_over <- function(earlier, agent, call) {
+  settings <- settings_of(agent)
+  differ <- Filter(
+    function(name) !is_same(earlier[[name]], agent[[name]]), intersect(lasting_settings, settings)
+  )
+  if (length(differ)) {
+    name <- sub("memory_size", "memory", differ[[1L]])
+    gym_abort(
+      c(paste0("The earlier training has another `", name, "`, which must stay when it goes on."),
+        i = paste0("Give the same `", name, "`, or start with the policy alone: ",
+                   "`policy = agent_policy(training$agent)`.")),
+      class = "gym_error_argument", argument = name, value = agent[[differ[[1L]]]], call = call
+    )
+  }
+  earlier[settings] <- agent[settings]
+  earlier
+}
+
+# A schedule that has come to its end at 0 would let the training go on in vain.
+check_still_learns <- function(agent, call) {
+  rate <- agent$learning_rate
+  taken <- agent$steps %||% agent$taken
+  if (is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0)) {
+    gym_abort(
+      c(paste0("The schedule of `learning_rate` is 0 after the agent's ", count_of(taken, "step"),
+               ", so it would learn nothing more."),
+        i = paste("Give a new `learning_rate` along with `policy = training`, or set it:",
+                  "`agent$learning_rate <- 1e-4`.")),
+      class = "gym_error_argument", argument = "learning_rate", value = rate, call = call
+    )
+  }
+}
+
+# An agent that goes on, in this environment.
+continued_agent <- function(agent, bound, call) {
+  if (learns_online(agent)) {
+    for (space in names(agent$spaces)) {
+      if (!identical(format(agent$spaces[[space]]), format(bound[[space]]))) {
+        gym_abort(
+          paste0("The agent has learned with the ", sub("_", " ", space), " ",
+                 format(agent$spaces[[space]]), ", and this environment has ",
+                 format(bound[[space]]), "."),
+          class = "gym_error_argument", argument = "env", call = call
+        )
+      }
+    }
+  } else if (!is.null(agent$policy)) {
+    agent$policy <- bound
+  }
+  agent
+}
+
+#' Find the policy to train
+#' @param agent As agent_to_train() returns it.
+#' @return `NULL` for a learner that makes its own.
+#' @noRd
+policy_to_train <- function(policy, agent) {
+  own <- if (has_started(agent)) agent$policy else starting_policy(policy, agent)
+  if (learns_online(agent)) {
+    if (!has_started(agent)) own
+  } else {
+    own %||% default_policy(agent)
+  }
+}
+
+# The policy to start with: after an agent of gradients the one that it trained, which draws its
+# actions, not the one that was evaluated.
+starting_policy <- function(policy, agent) {
+  of_gradients <- function(x) inherits(x, "gym_agent_gradient")
+  both <- of_gradients(agent) && inherits(policy, "gym_training") && of_gradients(policy$agent)
+  if (both) agent_policy(policy$agent) else trained_policy(policy)
+}
