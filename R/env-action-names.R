@@ -70,3 +70,75 @@ numbered_actions <- function(instance, action, call) {
   }
   as.integer(space$start) + number - 1L
 }
+
+# Actions with names -----------------------------------------------------------------------
+
+#' Put the numbers or parts of an action in the order of the space, by their names
+#'
+#' The names are those of the space or of the documentation, or of the columns of steps.
+#' @param space The action space.
+#' @param action One action, or a batch of them.
+#' @return The action without names. Names that are not known are an error.
+#' @noRd
+action_by_name <- function(space, action, env_id, call) {
+  if (is.list(action)) {
+    return(action_parts_by_name(space, action, env_id, call))
+  }
+  rows <- length(dim(action)) == 2L
+  given <- if (rows) colnames(action) else names(action)
+  n <- prod(space$shape)
+  if (is.null(given) || length(space$shape) != 1L || n < 2) {
+    # Names of single numbers are labels, as those that predict() gives.
+    return(action)
+  }
+  own <- space$names %||% action_meaning(env_id, n)
+  forms <- list(own, part_columns("action", space$names %||% seq_len(n)))
+  at <- places_of_names(given, forms, labels = rows && is.null(own))
+  if (is.null(at)) abort_action_names(space, action, given, forms, call)
+  unname(if (rows) action[, at, drop = FALSE] else action[at])
+}
+
+action_parts_by_name <- function(space, action, env_id, call) {
+  n <- length(space$spaces)
+  given <- names(action)
+  # check_value() refuses other keys.
+  if (!has_parts(space) || length(action) != n || !all(names(space$spaces) %in% given)) {
+    return(action)
+  }
+  if (is.null(names(space$spaces)) && !is.null(given)) {
+    forms <- list(space$names, part_columns("action", space$names %||% seq_len(n)))
+    at <- places_of_names(given, forms)
+    if (is.null(at)) abort_action_names(space, action, given, forms, call)
+    action <- unname(action[at])
+  }
+  map_parts(space, action_by_name, in_order(space, action), list(NULL), list(call))
+}
+
+#' Find the places of known names among given ones
+#'
+#' @param forms The names that are known, a list with an element for each form of them.
+#' @param labels Whether names of which none is known are labels of the user's own, such as the
+#'   column names that cbind() makes of the names of variables.
+#' @return What takes values in the order of the names: integers, or `TRUE` for the order given.
+#'   `NULL` if the names are to be refused.
+#' @noRd
+places_of_names <- function(given, forms, labels = FALSE) {
+  if (is.null(given) || labels && !any(given %in% unlist(forms))) {
+    return(TRUE)
+  }
+  for (known in forms) {
+    if (length(given) == length(known) && setequal(given, known)) {
+      return(match(known, given))
+    }
+  }
+}
+
+abort_action_names <- function(space, action, given, forms, call) {
+  known <- vapply(Filter(length, forms), few_names, "")
+  gym_abort(
+    c(paste0("The names of an action of ", format(space), " are ", paste(known, collapse = ", or "),
+             ", not ", few_names(given), "."),
+      i = "Without names it is taken by position: `unname()` removes them."),
+    class = "gym_error_space", space = space, value = action, path = "", call = call
+  )
+}

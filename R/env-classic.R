@@ -178,9 +178,10 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete (or its meaning, such as
 #'   `"push left"`, if the printed environment shows meanings), a numeric vector or array for Box.
-#'   [space_sample()] lists all kinds. A vector environment takes one for each sub-environment, in
-#'   the form of the observations of [env_reset()]: a vector for Discrete, a matrix with a row for
-#'   each for a Box of one dimension.
+#'   The names of its numbers must be known, such as `"main engine"` or, as in a table of steps,
+#'   `"action_1"`, in any order. [space_sample()] lists all kinds. A vector environment takes one for
+#'   each sub-environment, in the form of the observations of [env_reset()]: a vector for Discrete, a
+#'   matrix with a row for each for a Box of one dimension.
 #' @param render Show the environment? `TRUE` or `FALSE`, the default. The first `TRUE` opens the
 #'   environment's page, see [env_watch()]. While somebody watches, each such step takes real time.
 #'   [env_render()] returns a frame.

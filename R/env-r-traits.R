@@ -59,6 +59,9 @@ loosen_boxes <- function(space) {
 #' @noRd
 checked_action <- function(traits, action, which, call) {
   rules <- traits$action_rules
+  if (!is.null(attributes(action)) || is.list(action)) {
+    action <- action_by_name(traits$action_space, action, traits$spec$id, call)
+  }
   n <- if (!is.null(which)) length(which)
   if (!fits_quickly(rules, action, n, traits$fits_actions)) {
     check_one_or_batch(rules, action, n, call, which)

@@ -91,7 +91,23 @@ checked_observation <- function(traits, observation, n, where, call) {
       gym_error_space = function(cnd) refuse_observation(cnd, space, where, call)
     )
   }
+  check_order_of_names(space, observation, n, where, call)
   tidy_value(space, observation, n)
+}
+
+# Observations have their order from the space. Names in another order are a mistake; other names
+# may come from the vectors that they were computed from.
+check_order_of_names <- function(space, observation, n, where, call) {
+  given <- if (is.null(n) || is.list(observation)) names(observation) else colnames(observation)
+  if (!is.null(given) && !is.null(space$names) && !identical(given, space$names) &&
+        setequal(given, space$names)) {
+    gym_abort(
+      c(paste0(where, " returned an observation with names in another order than those of its ",
+               "space: ", few_names(given), "."),
+        i = paste0("Its order is ", few_names(space$names), ".")),
+      class = "gym_error_space", space = space, value = observation, path = "", call = call
+    )
+  }
 }
 
 # Whether a value or a batch of `n` fits, as is usual. `fits` checks batches: a single value is

@@ -121,6 +121,7 @@ prepare_single_step <- function(instance, fields, named) {
   bounds <- instance$classic && inherits(actions, "gym_space_discrete")
   request$check_and_write <- function(action, call) {
     action <- numbered_actions(instance, action, call)
+    action <- action_by_name(instance$single_action_space, action, instance$spec$id, call)
     check_value(actions, action, "", call, bounds)
     if (sends) {
       to_tensors(actions, action, "action", call)

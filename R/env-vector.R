@@ -41,6 +41,7 @@ prepare_vector_step <- function(instance, fields, which, named, infos) {
   request$write <- if (sends) tensors_writer(single, n) else function(action) NULL
   request$check_and_write <- function(action, call) {
     action <- numbered_actions(instance, action, call)
+    action <- action_by_name(instance$single_action_space, action, instance$spec$id, call)
     check_batch(single, actions, action, n, call, which)
     if (sends) {
       to_tensors(actions, action, "action", call)

@@ -8,6 +8,7 @@
 policy_matrix <- function(policy, model, call) {
   possible <- possible_actions(model)
   policy <- plain_numbers(policy, "policy", call)
+  if (is.numeric(policy)) policy <- in_model_order(policy, model, call)
   probabilities <- if (is.matrix(policy) && is.numeric(policy)) {
     check_policy_matrix(policy, possible, call)
   } else if (is.numeric(policy)) {
@@ -30,6 +31,27 @@ policy_matrix <- function(policy, model, call) {
   }
   probabilities[barred] <- 0
   probabilities
+}
+
+# Actions, or rows and columns of probabilities, in the order of the model, by their names.
+in_model_order <- function(policy, model, call) {
+  states <- names(model$start)
+  order_of <- function(given, forms, what, labels) {
+    places_of_names(given, forms, labels) %||% gym_abort(
+      c(paste0("The names of `policy` must be those of the ", what, ", ", few_names(forms[[1L]]),
+               ", not ", few_names(given), "."),
+        i = "Without names it is taken in their order: `unname()` removes them."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
+  if (!is.matrix(policy)) {
+    return(unname(policy[order_of(names(policy), list(states), "states", FALSE)]))
+  }
+  actions <- as.character(state_numbers(model$action_space))
+  meaning <- action_meaning(model$spec$id, length(actions))
+  row <- order_of(rownames(policy), list(states), "states", TRUE)
+  column <- order_of(colnames(policy), list(actions, meaning), "actions", is.null(meaning))
+  unname(policy[row, column, drop = FALSE])
 }
 
 possible_actions <- function(model) {

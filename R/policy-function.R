@@ -47,8 +47,12 @@ ask_about_one <- function(policy, one, vector_env) {
 #' an action of its space.
 #' @noRd
 batch_actions <- function(actions, n, vector_env) {
-  actions <- as_batch(vector_env$action_space, narrow_values(actions))
-  count <- batch_length(vector_env$action_space, actions)
+  space <- vector_env$action_space
+  actions <- as_batch(space, narrow_values(actions))
+  if (!is.null(attributes(actions)) || is.list(actions)) {
+    actions <- action_by_name(space, actions, vector_env$spec$id, vector_env$call)
+  }
+  count <- batch_length(space, actions)
   if (is.na(count) || count != n) {
     abort_action_count(actions, count, n, vector_env)
   }

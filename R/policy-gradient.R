@@ -158,6 +158,9 @@ counted_actions <- function(policy, action, n, call = rlang::caller_env()) {
     abort_argument(action, must, "action", call)
   }
   if (is_gaussian(policy)) {
+    if (!is.null(policy$action_space)) {
+      action <- action_by_name(policy$action_space, action, policy$env_id, call)
+    }
     # The numbers of an action with several dimensions are taken row by row.
     return(matrix(row_major(action), outputs))
   }

@@ -302,6 +302,8 @@ model_actions <- function(policy, columns, call) {
   if (discrete && inherits(policy$model, "nnet") && NCOL(predicted) == space$n && space$n > 1) {
     predicted <- largest_output(policy, predicted, call)
   }
+  # The columns of a model have names from the table of steps, or of its formula.
+  predicted <- action_by_name(space, predicted, NULL, call)
   check_predictions(policy, predicted, n, if (discrete) 1L else prod(space$shape), call)
   values <- if (is.factor(predicted)) as.character(predicted) else predicted
   values <- matrix(values, n, NCOL(predicted))

@@ -31,6 +31,7 @@ policy_table <- function(q, epsilon = 0, temperature = NULL) {
   if (!is.matrix(q) || !is.numeric(q) || !length(q) || anyNA(q)) {
     abort_argument(q, "a numeric matrix without missing values", "q", rlang::current_env())
   }
+  check_in_order(q)
   check_number(epsilon, min = 0, max = 1)
   if (!is.null(temperature)) check_above_zero(temperature)
   structure(
@@ -40,6 +41,22 @@ policy_table <- function(q, epsilon = 0, temperature = NULL) {
     ),
     class = c("gym_policy_table", "gym_policy")
   )
+}
+
+# Sorted as text, as by tapply(), row 10 comes before row 2.
+check_in_order <- function(q, call = rlang::caller_env()) {
+  for (axis in 1:2) {
+    names <- dimnames(q)[[axis]]
+    if (isTRUE(is.unsorted(suppressWarnings(as.numeric(names))))) {
+      sorted <- c("q[order(as.numeric(rownames(q))), ]", "q[, order(as.numeric(colnames(q)))]")
+      gym_abort(
+        c(paste0("The ", c("rows", "columns")[[axis]], " of `q` must be in the order of their ",
+                 "numbers, not ", few_names(names), "."),
+          i = paste0("`", sorted[[axis]], "` is.")),
+        class = "gym_error_argument", argument = "q", value = q, call = call
+      )
+    }
+  }
 }
 
 #' @export

@@ -77,7 +77,7 @@ json_writer.gym_space_box <- function(space) {
     return(json_writer.default(space))
   }
   function(value) {
-    if (length(value) == n && is.double(value) && !is.object(value) && is.null(dim(value)) &&
+    if (length(value) == n && is.double(value) && is.null(attributes(value)) &&
           all(is.finite(value))) {
       paste0('"action":', json_array(json_number(value)), ",")
     }
@@ -118,6 +118,7 @@ tensors_writer.gym_space_box <- function(space, n) {
   write <- tensor_types[[type]]$write
   function(values) {
     if (is.double(values) && !is.object(values) && identical(dim(values), shape) &&
+          is.null(dimnames(values)) &&
           isTRUE(max(abs(values)) <= limit)) {
       numbers <- if (shape[[2L]] == 1L) values else t(values)
       list(action = list(dtype = type, shape = shape, bytes = write(as.vector(numbers))))

@@ -371,3 +371,25 @@ test_that("a reset that returns nothing and a space that was left out are refuse
   expect_error(gym_env(function(self) 0, step, action_space = box), "`observation_space` must be",
                class = "gym_error_argument")
 })
+
+test_that("an observation whose names are in another order than its space's is refused", {
+  space <- space_box(c(position = -1, velocity = -1), 1)
+  playing <- function(first, later = first) {
+    gym_env(
+      reset = function(self) first,
+      step = function(self, action) list(observation = later, reward = 0, terminated = TRUE),
+      observation_space = space, action_space = space_discrete(2)
+    )
+  }
+  turned <- c(velocity = 0, position = 1)
+  expect_error(playing(turned)$reset(), "another order than those of its space: `velocity`",
+               class = "gym_error_space")
+  expect_error(rollout(playing(turned), policy_random(), seed = 1), "another order",
+               class = "gym_error_space")
+  env <- playing(c(1, 0), turned)
+  env$reset()
+  expect_error(env$step(0), "Its order is `position`, `velocity`", class = "gym_error_space")
+  # Names of what it was computed from.
+  other <- playing(c(angle = 1, angle = 0))$reset()
+  expect_identical(other, c(position = 1, velocity = 0))
+})

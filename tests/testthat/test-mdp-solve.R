@@ -353,3 +353,21 @@ test_that("what no memory holds is refused, with its number", {
   expect_error(solve_mdp(walk_model(), horizon = 1e8), "400,000,000 numbers",
                class = "gym_error_argument")
 })
+
+test_that("the names of a policy's actions and probabilities are used or refused", {
+  chain <- gym_model(data.frame(
+    state = c(0, 0, 1, 1), action = c(0, 1, 0, 1), next_state = c(1, 0, 0, 2),
+    reward = c(1, 0, 0, 5), terminated = c(FALSE, FALSE, FALSE, TRUE)
+  ), start = 0)
+  value <- function(policy) solve_mdp(chain, policy, discount = 0.5)$start_value
+  expected <- value(c(0, 1, 0))
+  expect_identical(value(c("2" = 0, "1" = 1, "0" = 0)), expected)
+  expect_error(value(c(a = 0, b = 1, c = 0)), "those of the states, `0`, `1`, `2`, not `a`",
+               class = "gym_error_argument")
+  p <- rbind(c(1, 0), c(0.2, 0.8), c(1, 0))
+  mixed <- matrix(p, 3, dimnames = list(0:2, 0:1))[3:1, 2:1]
+  expect_identical(value(mixed), value(p))
+  expect_identical(value(`dimnames<-`(p, list(letters[1:3], c("go", "stay")))), value(p))
+  expect_error(value(`colnames<-`(p, c("0", "stay"))), "those of the actions, `0`, `1`",
+               class = "gym_error_argument")
+})

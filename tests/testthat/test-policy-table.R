@@ -107,3 +107,13 @@ test_that("a learner is not taught by an observation that is no state", {
   cnd <- expect_error(learn_q(half, iterations = 2, seed = 1), class = "gym_error_argument")
   expect_match(conditionMessage(cnd$parent), "no row for the observation 1.5", fixed = TRUE)
 })
+
+test_that("a table whose names are numbers in another order is refused with the fix", {
+  q <- matrix(0, 3, 2, dimnames = list(c(0, 10, 2), 0:1))
+  expect_error(policy_table(q), "`q[order(as.numeric(rownames(q))), ]` is", fixed = TRUE,
+               class = "gym_error_argument")
+  expect_error(policy_table(q[c(1, 3, 2), 2:1]), "the order of their numbers, not `1`, `0`",
+               class = "gym_error_argument")
+  expect_no_error(policy_table(q[c(1, 3, 2), ]))
+  expect_no_error(policy_table(`colnames<-`(q[c(1, 3, 2), ], c("left", "right"))))
+})
