@@ -2,9 +2,16 @@
 
 #' Settings that solve environments
 #'
-#' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()] and [learn_dqn()] use these
-#' settings if the environment is given by its id and has a row here. A message says so. Arguments
-#' that you give replace those of the preset.
+#' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()], [learn_dqn()], [learn_q()],
+#' [learn_sarsa()] and [learn_monte_carlo()] use these settings if the environment is given by its
+#' id and has a row here. A message says so. Arguments that you give replace those of the preset.
+#'
+#' With one or two seeds the tables reached, where the best is 0.744 for FrozenLake, 0.913 for
+#' FrozenLake8x8, 7.93 for Taxi, -13 for CliffWalking and -0.043 for Blackjack: 0.73 to 0.74 (Q),
+#' 0.73 (Sarsa) and 0.71 to 0.73 (Monte Carlo) on the lake; 0.86 and 0.85 on the larger one; 7.87 to
+#' 7.89 and 7.4 to 7.7 in the taxi; -13 and -19 to -17 on the cliff; -0.075 in Blackjack, with a
+#' standard error of 0.014. Taxi's registered threshold of 8 is above the best, so a training uses
+#' its budget.
 #'
 #' @param env_id The id of an environment, a string, to get its presets only. `NULL`, the default,
 #'   returns all.
@@ -12,7 +19,8 @@
 #'   \describe{
 #'   \item{env_id, kwargs}{The environment's id, a string, and its arguments as JSON, empty for
 #'   none.}
-#'   \item{agent}{`"ars"`, `"cem"`, `"ppo"`, `"reinforce"` or `"dqn"`. The agent's arguments have a
+#'   \item{agent}{`"ars"`, `"cem"`, `"ppo"`, `"reinforce"`, `"dqn"`, `"q"`, `"sarsa"` or
+#'   `"monte_carlo"`. The agent's arguments have a
 #'   column each, see [agent_ars()] and the others; `NA` for an argument that the agent does not
 #'   have or whose default it keeps.}
 #'   \item{hidden, bias}{The policy of a search: the number of hidden neurons (tanh, with normalised
@@ -23,7 +31,7 @@
 #'   \item{linear, epsilon_steps}{If `linear` is `TRUE`, `learning_rate` and `clip` decrease from
 #'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
 #'   `epsilon_steps`.}
-#'   \item{episodes, total_steps}{Of the training; `total_steps` is its budget.}
+#'   \item{episodes, total_steps, max_steps}{Of the training; `total_steps` is its budget.}
 #'   \item{origin, source, tried}{`origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is
 #'   the number of settings that were tried with seeds 1 to 99 before these were chosen (an
 #'   integer). `vignette("solved")` reports other seeds.}
@@ -93,9 +101,14 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 make_and_train <- function(make, frame, ...) {
   match_whole_names(frame)
   check_no_steps(...names(), frame)
-  given <- lapply(rlang::set_names(ls(frame)), function(name) eval(as.name(name), frame))
-  env <- given$env
-  given <- Filter(Negate(is.null), given[names(given) != "env"])
+  values <- lapply(rlang::set_names(ls(frame)), function(name) eval(as.name(name), frame))
+  env <- values$env
+  values <- Filter(Negate(is.null), values[names(values) != "env"])
+  # The default of a learner's argument gives way to a preset.
+  is_default <- function(name) eval(call("missing", as.name(name)), frame)
+  by_default <- vapply(names(values), is_default, NA)
+  given <- values[!by_default]
+  defaults <- values[by_default]
   dots <- list(...)
   check_environment(env, "env", frame)
   of_agent <- names(formals(make))
@@ -107,12 +120,12 @@ make_and_train <- function(make, frame, ...) {
   goes_on <- goes_on_from(earlier, paste0("gym_", make))
   arguments <- if (goes_on) {
     # An earlier training goes on with its own settings, which defaults do not replace.
-    own <- Filter(function(name) !eval(call("missing", as.name(name)), frame), own)
     own_arguments(earlier$agent)
-  } else if (!is.null(preset)) {
-    preset_arguments(preset)
   } else {
-    list()
+    utils::modifyList(
+      defaults[intersect(of_agent, names(defaults))],
+      if (is.null(preset)) list() else preset_arguments(preset)
+    )
   }
   # The preset's `top` was meant for another number of directions, or another version.
   if (any(c("directions", "version") %in% own)) arguments$top <- NULL
@@ -132,7 +145,8 @@ make_and_train <- function(make, frame, ...) {
     abort_no_budget(preset_hints(env, kwargs), frame)
   }
   if (!is.null(preset)) {
-    from_preset <- setdiff(c("episodes", if (!budget) "total_steps"), names(training))
+    own <- c("episodes", "max_steps", if (!budget) "total_steps")
+    from_preset <- setdiff(intersect(own, names(preset)), names(training))
     training[from_preset] <- preset[from_preset]
   }
   if (!is.null(preset) && !goes_on) {
@@ -141,6 +155,8 @@ make_and_train <- function(make, frame, ...) {
     agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
     agent$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
   }
+  left <- setdiff(intersect(names(defaults), of_training), names(training))
+  training[left] <- defaults[left]
   naming_own_call(
     rlang::exec("train_agent", agent, env, !!!training, !!!kwargs), "train_agent", frame
   )
@@ -160,7 +176,10 @@ preset_hints <- function(env, kwargs) {
 }
 
 preset_policy <- function(preset, agent) {
-  if (inherits(agent, "gym_agent_gradient")) {
+  if (learns_online(agent)) {
+    # A learner makes its own.
+    NULL
+  } else if (inherits(agent, "gym_agent_gradient")) {
     policy <- default_policy(agent)
     if (!is.null(preset$hidden)) policy$sizes[2:3] <- preset$hidden
     policy$init <- preset$init %||% policy$init

@@ -62,7 +62,8 @@ check_spelling <- function(names, choices, can_begin, call) {
 
 abort_no_budget <- function(hints = NULL, call) {
   gym_abort(
-    c("Training needs a budget: give `iterations`, or `total_steps` of the environment.", hints),
+    c("Training needs a budget: give `iterations`, or `total_steps` of the environment.",
+      i = "`total_steps = 100000` is enough for a first look.", hints),
     class = "gym_error_argument", argument = "iterations", call = call
   )
 }

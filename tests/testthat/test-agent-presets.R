@@ -110,6 +110,30 @@ test_that("without a preset agents have their own defaults, and training needs a
   expect_error(agent_ars(4, 2, version = "V1"), "V1-t", class = "gym_error_argument")
 })
 
+test_that("a table takes its preset with its budget, and without one its own defaults", {
+  client <- test_client()
+  # The first evaluation ends it.
+  for (learn in list(learn_q, learn_sarsa)) {
+    expect_message(
+      taxi <- learn("Taxi-v4", target = -1e6, seed = 1, client = client), "preset for Taxi-v4"
+    )
+    expect_identical(taxi$agent$learning_rate, 0.5)
+    expect_identical(nrow(taxi$history), 1L)
+    preset <- find_preset(sub("gym_agent_", "", class(taxi$agent)[[1]]), "Taxi-v4", list())
+    expect_equal(taxi$rules$total_steps, preset$total_steps)
+  }
+  cliff <- suppressMessages(learn_q("CliffWalking-v1", target = -1e6, seed = 1, epsilon = 0.5,
+                                    client = client))
+  expect_identical(cliff$agent[c("epsilon", "learning_rate")],
+                   list(epsilon = 0.5, learning_rate = 0.5))
+  expect_equal(cliff$max_steps, 1000)
+  own <- learn_q(walk_model(), iterations = 2, seed = 1)
+  expect_identical(own$agent$weights,
+                   learn_q(walk_model(), iterations = 2, episodes = 10, seed = 1)$agent$weights)
+  expect_error(learn_q("Taxi-v4", is_rainy = TRUE, client = client),
+               "`total_steps = 100000`.*presets of Taxi-v4", class = "gym_error_argument")
+})
+
 test_that("whoever still writes `steps` is told its new name, before anything is made", {
   calls <- list(search_ars, search_cem, search_hill_climb, learn_q, learn_sarsa, learn_monte_carlo)
   for (call in calls) {
