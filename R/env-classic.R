@@ -27,8 +27,8 @@
 #'   a string, and its arguments by name, such as `list("TimeLimit", max_episode_steps = 50)`.
 #'   [gym_wrap()] builds such a list with a pipe.
 #' @param vectorization_mode How the sub-environments run. `"vector_entry_point"` uses the
-#'   environment's own vector implementation, by far the fastest if it has one, like CartPole.
-#'   `"sync"` runs them one after the other in the server's process. `"async"` runs groups of them
+#'   environment's own vector implementation if it has one, like CartPole, whose is the fastest from
+#'   some eight sub-environments on. `"sync"` runs them one after the other in the server's process. `"async"` runs groups of them
 #'   in worker processes, which is worthwhile if a step takes long. `"sync"` and `"async"` give the
 #'   same results. `NULL`, the default, uses the environment's own implementation if it supports the
 #'   other arguments, and otherwise depends on `num_workers`. Only with `num_envs`.
@@ -129,8 +129,8 @@ env_list_all <- function(x) {
 #' @param return_info Also return the environment's info? `TRUE` or `FALSE`, the default.
 #' @param mask For a vector environment: which sub-environments to reset, a logical vector with an
 #'   element for each of them, at least one `TRUE`. `NULL`, the default, resets all. An
-#'   environment's own vector implementation does not support a mask: make it with
-#'   `vectorization_mode = "sync"`.
+#'   environment's own vector implementation does not support a mask, except that of the Atari
+#'   games: make it with `vectorization_mode = "sync"`.
 #' @return The first observation, in the form of the observation space: a numeric vector for a Box
 #'   of one dimension, an array for one of more, an integer for Discrete. [space_sample()] lists all
 #'   kinds. With `return_info = TRUE` a list of `observation` and `info`.

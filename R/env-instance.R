@@ -43,6 +43,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   if (identical(render_mode, "human")) {
     watch_once(known_instance(client, instance_id, call), call)
   }
+  warn_as_gymnasium(answer, call)
   ready <- TRUE
   instance_id
 }
@@ -132,15 +133,30 @@ new_instance <- function(client, instance_id, about) {
 
 # Reads the server's description of an environment's spec.
 read_spec <- function(env_id, spec) {
-  list(
-    id = shown_line(env_id),
-    reward_threshold = if (!is.null(spec$reward_threshold)) {
-      number_from(spec$reward_threshold, "reward_threshold")
-    },
-    max_episode_steps = spec$max_episode_steps,
-    # The environment's own metadata may be anything.
-    render_fps = if (is_number(spec$render_fps)) spec$render_fps
+  c(
+    list(
+      id = shown_line(env_id),
+      reward_threshold = if (!is.null(spec$reward_threshold)) {
+        number_from(spec$reward_threshold, "reward_threshold")
+      },
+      max_episode_steps = spec$max_episode_steps,
+      # The environment's own metadata may be anything.
+      render_fps = if (is_number(spec$render_fps)) spec$render_fps
+    ),
+    if (length(spec$engine)) list(engine = texts_of(spec$engine))
   )
+}
+
+texts_of <- function(json) lapply(Filter(rlang::is_string, as.list(json)), shown_line)
+
+# Gymnasium's warnings about an environment that the server made.
+warn_as_gymnasium <- function(answer, call) {
+  for (text in texts_of(answer$warnings)) {
+    rlang::warn(
+      text, class = "gym_warning_gymnasium", .frequency = "once",
+      .frequency_id = paste("gym", text), call = call
+    )
+  }
 }
 
 # The names of the wrappers around an instance, which classic servers do not send.

@@ -8,9 +8,14 @@
 #'
 #' With `num_envs` it is a vector environment. It has sub-environments, copies of the environment
 #' that one call resets or steps together. Observations and actions then have a row for each
-#' sub-environment; [env_reset()] and [env_step()] describe their forms. An environment's own vector
-#' implementation may differ from the single environment in details, such as the frame size of the
-#' Atari games.
+#' sub-environment; [env_reset()] and [env_step()] describe their forms.
+#'
+#' For an Atari game Python's `make_vec()` takes the game's own vector environment, which observes
+#' the last four frames, in grey and 84 x 84. Here its sub-environments are the same as a single
+#' environment: each observes one frame. `vectorization_mode = "vector_entry_point"` gives what
+#' Python gives. It takes an `autoreset_mode`, a seed below 2^31 for each sub-environment, the mask
+#' of a reset, and arguments of its own, such as `reward_clipping`. It counts the frames of an
+#' episode (`max_num_frames_per_episode`) and has no `max_episode_steps`.
 #'
 #' # Names of observations
 #'
@@ -61,8 +66,11 @@
 #'     `$num_workers` is also `NULL` with a vector implementation,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
 #'     including wrappers) and `render_fps` (frames per second), these three `NULL` if the
-#'     environment has none, and `wrappers` (their names),
+#'     environment has none, `engine` (the version of the package that simulates it, such as
+#'     mujoco, by name; none for an environment of Gymnasium alone) and `wrappers` (their names),
 #'   * `$client`, `$instance_id`: for the classic calls.
+#' @section Warnings: Gymnasium's own have class `gym_warning_gymnasium` and come once a session:
+#'   an id that is out of date, or a value that an environment does not recommend.
 #' @section Errors: As for [env_create()]. `gym_error_server_start` if no server could be started.
 #'   `gym_error_install` if its Python environment could not be installed. `gym_error_argument` for
 #'   a name after the dollar that the object does not have.

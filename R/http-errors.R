@@ -49,13 +49,14 @@ extra_hint <- function(extra, url) {
   if (!is.null(extra) && !is.null(server$extra_hint)) server$extra_hint(extra)
 }
 
-# The server's messages start in lower case and without a full stop, so that they fit anywhere. No
+# The server's messages start in lower case and without a full stop, so that they fit anywhere. Ids
+# and names of arguments keep their case, so only a word of nothing but letters gets a capital. No
 # full stop is added after a quoted command, because people would copy it.
 sentence <- function(text) {
   if (is.null(text)) {
     return(NULL)
   }
-  if (!grepl("^[a-z_]+\\(", text)) {
+  if (grepl("^[a-z]+([ ,.:;']|$)", text)) {
     text <- paste0(chartr("a-z", "A-Z", substr(text, 1L, 1L)), substring(text, 2L))
   }
   if (grepl("[.?!\"]$", text)) text else paste0(text, ".")

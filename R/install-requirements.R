@@ -1,7 +1,7 @@
 # The lock files of the server's Python packages, which are part of this package and written by
 # tools/lock. base.txt lists the server's own packages, EXTRA.txt those of an extra.
 
-server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video")
+server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video", "jax")
 
 lock_file <- function(part = "base") {
   system.file("server", "lock", paste0(part, ".txt"), package = "gym")

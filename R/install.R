@@ -23,7 +23,8 @@
 #' institution's mirror.
 #'
 #' @param extras Extras to install, a character vector of `"toy-text"`, `"box2d"`, `"mujoco"`,
-#'   `"atari"` and `"video"`. The default is none. Classic control and toy text work without extras.
+#'   `"atari"`, `"video"` and `"jax"` (600 MB). The default is none. Classic control and toy text
+#'   work without extras.
 #' @param ... Must be empty.
 #' @param offline A folder filled by [gym_server_bundle()] on another machine, a string, to install
 #'   without the network. `NULL`, the default, installs from the network.

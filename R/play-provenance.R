@@ -3,7 +3,7 @@
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
   # NumPy calculates what policies do that play on the server.
-  versions <- server_versions(vector_env$client) %||% vector_env$model$versions
+  versions <- playing_versions(vector_env) %||% vector_env$model$versions
   described <- vector_env$description$versions
   way <- if (!is.null(vector_env$model)) {
     "from the model in R"
@@ -34,6 +34,12 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
     ),
     class = "gym_provenance"
   )
+}
+
+# The versions of the server and of what simulates the environment, such as MuJoCo; `NULL` without a
+# server. Episodes may differ from one version to another.
+playing_versions <- function(vector_env) {
+  c(server_versions(vector_env$client), vector_env$spec$engine)
 }
 
 #' @export

@@ -10,7 +10,8 @@
 #' @return An object of class `gym_provenance`, which prints a line for each element. It is a list
 #'   of
 #'   * `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK`: strings,
-#'   * `server`: the versions of the server, a named list of strings; `NULL` for an environment in
+#'   * `server`: the versions of the server, and of what simulates the environment (mujoco, ale-py,
+#'     Box2D or jax), a named list of strings; `NULL` for an environment in
 #'   R,
 #'   * `processor`: a string; the server's processor if its processes play, because the last bits of
 #'   NumPy depend on it,

@@ -21,7 +21,7 @@ from packaging.markers import Marker
 from packaging.utils import parse_wheel_filename
 
 SERVER = Path(__file__).parent.parent / "inst" / "server"
-EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video")
+EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video", "jax")
 PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 # The Python that gym_server_install() installs.
 USUAL_PYTHON = (3, 12)

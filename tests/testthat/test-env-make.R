@@ -56,3 +56,24 @@ test_that("set.seed() fixes an environment that is given no seed, by the one num
   expect_identical(first(seed = seed), drawn)
   expect_false(identical(first(), drawn))
 })
+
+test_that("Gymnasium's warnings come once, as warnings", {
+  client <- test_client()
+  make <- function() {
+    gym_make("LunarLander-v3", enable_wind = TRUE, wind_power = 29, client = client)$close()
+  }
+  warned <- expect_warning(make(), "^wind_power value .* 29", class = "gym_warning_gymnasium")
+  expect_no_match(conditionMessage(warned), "\033", fixed = TRUE)
+  expect_no_warning(make())
+  expect_warning(
+    rollout("Acrobot", policy_random(), seed = 1, max_steps = 1, client = client),
+    "latest versioned environment `Acrobot-v1`", class = "gym_warning_gymnasium"
+  )
+})
+
+test_that("what cannot be made gives the reason of the registry", {
+  client <- test_client()
+  listed <- env_registry(client, "Pusher-v4")
+  skip_if(listed$available)
+  expect_error(gym_make("Pusher-v4", client = client), listed$reason, fixed = TRUE)
+})

@@ -63,3 +63,13 @@ test_that("the same call gives the same rollout, its provenance included", {
   play <- function() rollout(fake_environment(), policy_random(), 3, seed = 1)
   expect_identical(play(), play())
 })
+
+test_that("the engine that simulates an environment is named with its version", {
+  play <- function(policy) {
+    provenance(rollout("LunarLander-v3", policy, seed = 1, max_steps = 2, client = test_client()))
+  }
+  beside <- play(policy_random())
+  expect_match(beside$server$Box2D, "^[0-9.]+$")
+  expect_identical(play(function(observation) 0)$server$Box2D, beside$server$Box2D)
+  expect_match(format(beside), "^server: .*Box2D [0-9]", all = FALSE)
+})

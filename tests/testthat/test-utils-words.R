@@ -25,6 +25,15 @@ test_that("thousands are not marked by the session's decimal mark", {
   expect_identical(count_of(1e6, "step"), "1.000.000 steps")
 })
 
+test_that("ids and names of arguments keep their case at the start of a sentence", {
+  expect_identical(sentence("instance lost"), "Instance lost.")
+  expect_identical(sentence("it's full, sorry"), "It's full, sorry.")
+  for (text in c("phys2d/CartPole-v1 needs jax.", "frame_skip must be 1.", "walker-v0 is gone.",
+                 "max_steps is missing.", "step() needs an episode.")) {
+    expect_identical(sentence(text), text)
+  }
+})
+
 test_that("in a Turkish locale words of English keep their dots", {
   local_locale("LC_CTYPE", "tr_TR", "ISO-8859-9")
   expect_false(identical(tolower("I"), "i"))

@@ -5,12 +5,20 @@ An exception from an environment may repeat everything that a client sent, any n
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import re
+import threading
 import time
 import traceback
+import warnings
+from collections.abc import Iterator
 from types import CodeType, TracebackType
+from typing import TextIO
 
 from gym_server.json_values import LONGEST_MESSAGE, shortened
+
+_log = logging.getLogger("py.warnings")
 
 _LONGEST_TRACEBACK = 20_000
 
@@ -32,7 +40,51 @@ def set_up(level: str | int, about_process: str = "") -> None:
         Formatter(f"%(asctime)s %(levelname)s %(name)s{about_process}: %(message)s")
     )
     logging.basicConfig(level=level, handlers=[handler])
-    logging.captureWarnings(True)
+    # Each time, and not once in the life of a process: each client is to get them.
+    warnings.filterwarnings("always", _GYMNASIUM)
+    warnings.showwarning = _show_warning
+
+
+# How Gymnasium's warnings begin: it colours them.
+_GYMNASIUM = r"(\x1b\[\d+m)?WARN: "
+
+
+class _Heard(threading.local):
+    texts: list[str] | None = None
+
+
+_heard = _Heard()
+
+
+@contextlib.contextmanager
+def hearing() -> Iterator[list[str]]:
+    """Collect the warnings of Gymnasium that this thread causes meanwhile."""
+    texts: list[str] = []
+    _heard.texts = texts
+    try:
+        yield texts
+    finally:
+        _heard.texts = None
+
+
+def hear(text: str) -> None:
+    """Add a warning to those that are collected."""
+    if _heard.texts is not None and text not in _heard.texts:
+        _heard.texts.append(text)
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    text = re.sub(r"\x1b\[\d+m", "", str(message))
+    _log.warning("%s:%s: %s: %s", filename, lineno, category.__name__, text)
+    if re.match(_GYMNASIUM, str(message)):
+        hear(text.removeprefix("WARN: "))
 
 
 class Formatter(logging.Formatter):

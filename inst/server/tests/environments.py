@@ -45,8 +45,6 @@ def reason(spec: EnvSpec) -> str | None:
         if spec.name.startswith("GymV2"):
             return "may import any module that its env_id names; the server refuses it"
         return "MuJoCo v2 and v3 moved to gymnasium-robotics; Gymnasium keeps the name only"
-    if family(spec) in ("phys2d", "tabular"):
-        return None if is_available(spec) else "needs jax, which no extra of the server brings"
     if spec.id == "Pusher-v4" and not is_available(spec):
         return "Gymnasium makes it with MuJoCo 2 only"
     return None if is_available(spec) else f"its extra is not installed ({family(spec)})"

@@ -36,7 +36,7 @@ class AllowedPaths:
         Raises:
             GymServerError: ``invalid_kwargs``.
         """
-        self._check(config.kwargs or {}, "kwargs")
+        self._check(config.kwargs or {}, "'kwargs'")
         for wrapper in config.wrappers:
             self._check(wrapper.kwargs, wrapper.name)
 

@@ -126,7 +126,7 @@ def _check_length(kwargs: dict) -> None:
     if length > _LONGEST_ARGUMENTS:
         raise GymServerError(
             "invalid_kwargs",
-            f"kwargs may have at most {_LONGEST_ARGUMENTS:,} characters of JSON, not {length:,}",
+            f"'kwargs' may have at most {_LONGEST_ARGUMENTS:,} characters of JSON, not {length:,}",
         )
 
 
@@ -138,7 +138,7 @@ def _check_sizes(kwargs: dict, limits: Mapping[str, tuple[float, int]], prefix: 
             if not least <= number <= most:
                 must = f"at least {least}" if number < least else f"at most {most}"
                 raise GymServerError(
-                    "invalid_kwargs", f"{prefix}{name} must be {must}, not {brief(number)}"
+                    "invalid_kwargs", f"{prefix}'{name}' must be {must}, not {brief(number)}"
                 )
 
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import importlib.metadata
 import importlib.util
+import re
 import sys
+from collections.abc import Callable
 
 from gymnasium.envs.registration import EnvSpec
 
@@ -17,16 +21,25 @@ REQUIREMENTS = {
     "mujoco": ("gymnasium[mujoco]",),
     "atari": ("gymnasium[atari]", "opencv-python-headless"),
     "video": ("moviepy",),
+    "jax": ("gymnasium[jax]",),
 }
 
-# By the package of an environment: its extra, and the module that must be installed. Toy text needs
-# only the server's own dependencies.
-_PACKAGES = {
-    "gymnasium.envs.box2d": ("box2d", "Box2D"),
-    "gymnasium.envs.mujoco": ("mujoco", "mujoco"),
-    "gymnasium.envs.phys2d": (None, "jax"),
-    "gymnasium.envs.tabular": (None, "jax"),
-    "ale_py": ("atari", "ale_py"),
+# By the package of an environment: its extra, and the modules that must be installed. Toy text
+# needs only the server's own dependencies.
+_PACKAGES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "gymnasium.envs.box2d": ("box2d", ("Box2D",)),
+    "gymnasium.envs.mujoco": ("mujoco", ("mujoco",)),
+    "gymnasium.envs.phys2d": ("jax", ("jax", "flax")),
+    "gymnasium.envs.tabular": ("jax", ("jax", "flax")),
+    "ale_py": ("atari", ("ale_py",)),
+}
+
+# The distributions whose version decides what is played, by extra. Box2D has two.
+_ENGINES = {
+    "box2d": ("Box2D", "box2d-py"),
+    "mujoco": ("mujoco",),
+    "atari": ("ale-py",),
+    "jax": ("jax",),
 }
 
 # Gymnasium refuses to make it with a later MuJoCo, whose results differ.
@@ -43,24 +56,56 @@ def is_available(spec: EnvSpec) -> bool:
     return why_unavailable(spec) is None
 
 
+def lacks_extra(spec: EnvSpec) -> bool:
+    """Return whether an extra would make an environment available."""
+    return not all(map(_is_installed, _needs(spec)[1]))
+
+
 def why_unavailable(spec: EnvSpec) -> str | None:
     """Return why an environment cannot be made here, or None, without importing anything."""
-    if not isinstance(spec.entry_point, str):
+    maker = maker_of(spec)
+    if not isinstance(maker, str):
         # For environments that moved to another package, Gymnasium registers a function that
-        # raises. The type is ignored because Gymnasium's creator protocol has no __name__.
-        moved = spec.entry_point is None or spec.entry_point.__name__.startswith("_raise")  # type: ignore[attr-defined]
+        # raises.
+        moved = maker is None or getattr(maker, "__name__", "").startswith("_raise")
         return "it is no longer part of Gymnasium" if moved else None
-    extra, module = _needs(spec)
-    if module and not _is_installed(module):
-        return f"it needs the server's extra '{extra}'" if extra else _needs_package(module)
+    if lacks_extra(spec):
+        return f"it needs the server's extra '{extra_of(spec)}'"
     if spec.id in _BEFORE_MUJOCO_3 and _major_version("mujoco") >= 3:
         return "it needs a MuJoCo before version 3"
-    package = spec.entry_point.partition(":")[0].partition(".")[0]
-    return None if _is_installed(package) else _needs_package(package)
+    package = maker.partition(":")[0].partition(".")[0]
+    if _is_installed(package):
+        return None
+    return f"it needs the Python package '{package}', which no extra installs"
 
 
-def _needs_package(module: str) -> str:
-    return f"it needs the Python package '{module}', which no extra installs"
+def maker_of(spec: EnvSpec) -> str | Callable | None:
+    """Return what makes an environment, or its vector implementation if it has nothing else.
+
+    A ``functools.partial`` has no name and no module, so its function is returned.
+    """
+    return unwrapped(spec.entry_point or spec.vector_entry_point)
+
+
+def unwrapped(maker: str | Callable | None) -> str | Callable | None:
+    """Return the function of a ``functools.partial``, and anything else as it is."""
+    while isinstance(maker, functools.partial):
+        maker = maker.func
+    return maker
+
+
+def engine_versions(spec: EnvSpec) -> dict[str, str]:
+    """Return the versions of the packages, besides Gymnasium, that decide what is played."""
+    maker = maker_of(spec)
+    module = maker if isinstance(maker, str) else getattr(maker, "__module__", None) or ""
+    # The name of a package of somebody else is mostly that of its module.
+    names = _ENGINES.get(extra_of(spec) or "", (re.split("[.:]", module)[0],))
+    versions = {}
+    for name in names:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError, ValueError):
+            versions[name] = importlib.metadata.version(name)
+    versions.pop("gymnasium", None)
+    return versions
 
 
 def _major_version(package: str) -> int:
@@ -85,18 +130,13 @@ def how_to_install(extra: str) -> str:
     return f'in a terminal: uv pip install --python "{sys.executable}" {wanted}'
 
 
-def unmet_module(spec: EnvSpec) -> str | None:
-    """Return a module that an environment needs and that no extra installs, if it is missing."""
-    extra, module = _needs(spec)
-    return module if extra is None and module and not _is_installed(module) else None
-
-
-def _needs(spec: EnvSpec) -> tuple[str | None, str | None]:
-    if isinstance(spec.entry_point, str):
+def _needs(spec: EnvSpec) -> tuple[str | None, tuple[str, ...]]:
+    maker = maker_of(spec)
+    if isinstance(maker, str):
         for package, needs in _PACKAGES.items():
-            if spec.entry_point.startswith((f"{package}.", f"{package}:")):
+            if maker.startswith((f"{package}.", f"{package}:")):
                 return needs
-    return None, None
+    return None, ()
 
 
 def _is_installed(module: str) -> bool:

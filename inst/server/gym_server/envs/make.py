@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import importlib
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, TypeVar, cast
@@ -10,15 +11,23 @@ from typing import Any, TypeVar, cast
 import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
+from gymnasium.vector import AutoresetMode
 
+from gym_server import logs
 from gym_server.envs import argument_limits, mujoco
 from gym_server.envs.atari import classic_game
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.extras import extra_of, is_available, missing_extra, unmet_module
+from gym_server.envs.extras import (
+    extra_of,
+    lacks_extra,
+    missing_extra,
+    unwrapped,
+    why_unavailable,
+)
 from gym_server.envs.memory_estimate import environment_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import LONGEST_ID, importing, look_up, near
-from gym_server.envs.tuple_arguments import with_tuples
+from gym_server.envs.tuple_arguments import parameters_of, with_tuples
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.json_values import brief, parse_nonfinite
 
@@ -38,7 +47,7 @@ def make_env(
     Raises:
         GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
             ``module_not_allowed``, ``missing_dependency``, ``invalid_parameter`` (render_mode),
-            ``invalid_kwargs``, ``too_much_memory``, ``environment_error``.
+            ``invalid_kwargs``, ``not_supported``, ``too_much_memory``, ``environment_error``.
     """
     kwargs = config.kwargs or {}
     check_kwargs(kwargs)
@@ -55,28 +64,26 @@ def check_kwargs(kwargs: dict) -> None:
     if "render_mode" in kwargs:
         raise GymServerError(
             "invalid_kwargs",
-            "kwargs must not contain 'render_mode'",
+            "'kwargs' must not contain 'render_mode'",
             "send render_mode as its own parameter",
         )
 
 
 @contextlib.contextmanager
 def naming_extra(spec: registration.EnvSpec) -> Iterator[None]:
-    """Name the server's extra in a ``missing_dependency`` error if that extra would help."""
+    """Give the registry's reason in a ``missing_dependency`` error."""
     try:
         yield
     except GymServerError as refusal:
+        reason = why_unavailable(spec) if refusal.code == "missing_dependency" else None
+        if reason is None:
+            raise
         extra = extra_of(spec)
-        if refusal.code == "missing_dependency" and extra is not None and not is_available(spec):
+        if extra is not None and lacks_extra(spec):
             raise missing_extra(spec.id, extra) from refusal
-        module = unmet_module(spec)
-        if refusal.code == "missing_dependency" and module:
-            raise GymServerError(
-                "missing_dependency",
-                f"{spec.id} needs the Python package '{module}', which no extra installs",
-                "install it into the server's Python",
-            ) from refusal
-        raise
+        raise GymServerError(
+            "missing_dependency", f"{spec.id} cannot be made: {reason}", refusal.message
+        ) from refusal
 
 
 def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.EnvSpec:
@@ -100,9 +107,26 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
         with importing:
             if module:
                 call_env(importlib.import_module, module)
-            return look_up(name)
+            spec = look_up(name)
     except error.Error as failure:
         raise _explain(failure, env_id, name) from failure
+    _hear_of_version(spec, name)
+    return spec
+
+
+def _hear_of_version(spec: registration.EnvSpec, name: str) -> None:
+    """Give the warnings of ``gymnasium.make()``, which gives none for a spec."""
+    latest = registration.find_highest_version(spec.namespace, spec.name)
+    if registration.parse_env_id(name)[2] is None and spec.version is not None:
+        logs.hear(
+            f"Using the latest versioned environment `{spec.id}` instead of the unversioned "
+            f"environment `{name}`."
+        )
+    elif latest is not None and spec.version is not None and latest > spec.version:
+        logs.hear(
+            f"The environment {spec.id} is out of date. You should consider upgrading to version "
+            f"`v{latest}`."
+        )
 
 
 def _is_module(text: str) -> bool:
@@ -157,8 +181,14 @@ def load_creator(spec: registration.EnvSpec) -> Callable:
     """Import the class or function that makes an environment.
 
     Raises:
-        GymServerError: ``missing_dependency``, ``environment_error``.
+        GymServerError: ``missing_dependency``, ``not_supported``, ``environment_error``.
     """
+    if spec.entry_point is None and spec.vector_entry_point is not None:
+        raise GymServerError(
+            "not_supported",
+            f"{spec.id} is only a vector environment",
+            "send num_envs, the number of sub-environments, and no vectorization_mode",
+        )
     return call_env(_load_creator, spec)
 
 
@@ -191,7 +221,7 @@ def choose_render_mode(
     Raises:
         GymServerError: ``invalid_parameter``.
     """
-    metadata = getattr(creator, "metadata", None)
+    metadata = getattr(unwrapped(creator), "metadata", None)
     # A function has no metadata. Then Gymnasium handles the client's render_mode.
     modes = metadata.get("render_modes", []) if isinstance(metadata, dict) else None
     if wanted is None:
@@ -216,20 +246,55 @@ def make_from_spec(
     if render_mode is not None:
         ours["render_mode"] = render_mode
     given = with_tuples(load_creator(spec), kwargs)
-    return call_env(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
+    try:
+        return call_env(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
+    except GymServerError as refusal:
+        if refusal.code == "invalid_kwargs" and spec.vector_entry_point is not None:
+            _explain_vector_arguments(spec, kwargs, refusal)
+        raise
+
+
+def _explain_vector_arguments(
+    spec: registration.EnvSpec, kwargs: dict, refusal: GymServerError
+) -> None:
+    """Say so if an argument belongs to an environment's vector implementation only."""
+    known = parameters_of(load_creator(vector_spec(spec)))
+    for name in kwargs:
+        if name in known and f"'{name}'" in refusal.message:
+            raise GymServerError(
+                "invalid_kwargs",
+                f"Only the vector implementation of {spec.id} has an argument '{name}'",
+                'send num_envs, and vectorization_mode "vector_entry_point"',
+            ) from refusal
+
+
+def vector_spec(spec: registration.EnvSpec) -> registration.EnvSpec:
+    """Return a spec whose entry point is the vector implementation."""
+    copied = copy.copy(spec)
+    # The type is ignored because a vector environment is not an environment.
+    copied.entry_point = spec.vector_entry_point  # type: ignore[assignment]
+    return copied
 
 
 def make_vector_entry_point(
-    spec: registration.EnvSpec, num_envs: int, render_mode: str | None, kwargs: dict
+    spec: registration.EnvSpec,
+    num_envs: int,
+    render_mode: str | None,
+    kwargs: dict,
+    autoreset_mode: AutoresetMode,
 ) -> gymnasium.vector.VectorEnv:
     """Make an environment's own vector implementation.
+
+    Its autoreset_mode may be another one, if it has no such argument.
 
     Raises:
         GymServerError: as for ``make_from_spec()``.
     """
 
     def make() -> gymnasium.vector.VectorEnv:
-        ours = {} if render_mode is None else {"render_mode": render_mode}
+        ours: dict[str, Any] = {} if render_mode is None else {"render_mode": render_mode}
+        if "autoreset_mode" in parameters_of(load_creator(vector_spec(spec))):
+            ours["autoreset_mode"] = autoreset_mode
         return gymnasium.make_vec(
             spec,
             num_envs=num_envs,

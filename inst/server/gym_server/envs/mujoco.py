@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import functools
 import logging
 import os
 import sys
@@ -37,7 +38,13 @@ def log_warnings() -> None:
     """Send MuJoCo's warnings to the server's log instead of a file in the working directory."""
     import mujoco
 
-    mujoco.set_mju_user_warning(lambda words: log.warning("MuJoCo: %s", words))
+    mujoco.set_mju_user_warning(_log_once)
+
+
+@functools.lru_cache(maxsize=64)
+def _log_once(words: str) -> None:
+    # It gives the same one for each environment.
+    log.warning("MuJoCo: %s", words)
 
 
 def draw_in_own_context() -> None:

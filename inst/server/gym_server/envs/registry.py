@@ -15,7 +15,14 @@ from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 
 from gym_server.envs.atari import classic_game
-from gym_server.envs.extras import extra_of, is_available, missing_extra, why_unavailable
+from gym_server.envs.extras import (
+    extra_of,
+    is_available,
+    lacks_extra,
+    maker_of,
+    missing_extra,
+    why_unavailable,
+)
 from gym_server.errors import GymServerError, invalid_parameter
 
 log = logging.getLogger(__name__)
@@ -96,7 +103,11 @@ def near(name: str, limit: int = 3) -> list[str]:
 
     Leaves out ids that no extra of the server can make.
     """
-    ids = [i for i, spec in gymnasium.registry.items() if extra_of(spec) or is_available(spec)]
+    ids = [
+        env_id
+        for env_id, spec in gymnasium.registry.items()
+        if is_available(spec) or lacks_extra(spec)
+    ]
     found = difflib.get_close_matches(name, ids, n=limit, cutoff=0.6)
     if not found:
         by_lower_case = {env_id.lower(): env_id for env_id in ids}
@@ -152,10 +163,10 @@ def _entry(spec: EnvSpec) -> dict:
 
 def module_of(spec: EnvSpec) -> str:
     """Return the module that makes an environment, or ""."""
-    entry_point = spec.entry_point
-    if isinstance(entry_point, str):
-        return entry_point.partition(":")[0]
-    return getattr(entry_point, "__module__", None) or ""
+    maker = maker_of(spec)
+    if isinstance(maker, str):
+        return maker.partition(":")[0]
+    return getattr(maker, "__module__", None) or ""
 
 
 def is_known(module: str) -> bool:

@@ -24,14 +24,15 @@ def with_tuples(creator: Callable, kwargs: dict) -> dict:
     """
     if not any(isinstance(value, list) for value in kwargs.values()):
         return kwargs
-    parameters = _parameters(creator)
+    parameters = parameters_of(creator)
     return {
         name: _as_tuple(value) if name in parameters and _wants(parameters[name]) else value
         for name, value in kwargs.items()
     }
 
 
-def _parameters(creator: Callable) -> typing.Mapping[str, inspect.Parameter]:
+def parameters_of(creator: Callable) -> typing.Mapping[str, inspect.Parameter]:
+    """Return the parameters of a class or function by name; none if they are not known."""
     # Evaluating an annotation fails if it is a string with names that are imported only for type
     # checkers, or for any other reason.
     for eval_str in (True, False):

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Callable, Collection
 from functools import partial
 
+from gym_server import logs
 from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import model_bytes
@@ -40,6 +41,20 @@ def make_instance(
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
             and ``LocalInstance``.
     """
+    with logs.hearing() as warnings:
+        instance = _make(config, allowed_modules, max_num_envs, renderer, undo, reservation)
+    instance.warnings = warnings
+    return instance
+
+
+def _make(
+    config: EnvConfig,
+    allowed_modules: Collection[str],
+    max_num_envs: int,
+    renderer: RenderThread,
+    undo: contextlib.ExitStack,
+    reservation: MemoryReservation,
+) -> LocalInstance:
     if config.num_envs is None:
         env = make.make_env(config, allowed_modules, reservation)
         undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))

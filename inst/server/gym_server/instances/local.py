@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from gymnasium.spaces import Space
 from gym_server import spaces
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
+from gym_server.envs.extras import engine_versions
 from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info
 from gym_server.envs.transition_model import transition_model
@@ -44,6 +45,7 @@ class LocalInstance(Instance):
         single_observation_space: the observation space of one sub-environment.
         drawing: draws and closes the environment.
         statistics: the statistics of its episodes.
+        warnings: Gymnasium's warnings about what was made.
         vectorization_mode: what runs the sub-environments; None for a single environment.
         num_workers: the number of worker processes; None for a single environment, and for the
             environment's own vector implementation.
@@ -56,6 +58,7 @@ class LocalInstance(Instance):
     single_observation_space: Space
     drawing: Drawing
     statistics: EpisodeStatistics | VectorEpisodeStatistics
+    warnings: Sequence[str] = ()
     vectorization_mode: str | None = None
     num_workers: int | None = None
     autoreset_mode: str | None = None
@@ -229,6 +232,8 @@ class LocalInstance(Instance):
             "reward_threshold": spec.reward_threshold if spec else None,
             "max_episode_steps": self._max_episode_steps,
             "render_fps": plain(self._render_fps),
+            "engine": engine_versions(spec) if spec else {},
+            "warnings": list(self.warnings),
             "vectorization_mode": self.vectorization_mode,
             "num_workers": self.num_workers,
             "autoreset_mode": self.autoreset_mode,

@@ -20,7 +20,7 @@ from gym_server.instances.local import LocalInstance
 from gym_server.json_values import plain
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.vector_envs.entry_point import EntryPointEnv
+from gym_server.vector_envs.entry_point import EntryPointEnv, why_seed_too_large
 from gym_server.vector_envs.sub_envs import SubEnvs
 
 
@@ -77,12 +77,12 @@ class VectorInstance(LocalInstance):
             self._check_reset_mask(mask)
 
     def _check_seed(self, seed: int | tuple | None) -> None:
+        if isinstance(self.gym_env, EntryPointEnv):
+            self._check_seed_of_entry_point(seed)
         if not isinstance(seed, tuple):
             return
         if len(seed) != self._num_envs:
             raise wrong_length("seed", len(seed), self._num_envs, "integer or null")
-        if not self.gym_env.runs_each:
-            raise self._not_supported("seed for each sub-environment")
         if self.gym_env.autoreset_mode is AutoresetMode.DISABLED:
             for one in seed:
                 if isinstance(one, tuple):
@@ -93,9 +93,20 @@ class VectorInstance(LocalInstance):
                         "autoreset_mode 'Disabled' none starts an episode automatically",
                     )
 
+    def _check_seed_of_entry_point(self, seed: int | tuple | None) -> None:
+        if not self.gym_env.resets_each:
+            if isinstance(seed, tuple):
+                raise self._not_supported("seed for each sub-environment")
+            return
+        if isinstance(seed, tuple) and any(isinstance(one, tuple) for one in seed):
+            raise self._not_supported("seeds for the episodes that follow")
+        reason = why_seed_too_large(seed, self._num_envs)
+        if reason is not None:
+            raise GymServerError("invalid_parameter", f"{self.env_id}: {reason}")
+
     def _check_reset_mask(self, mask: np.ndarray) -> None:
         self._check_mask("reset_mask", mask)
-        if not self.gym_env.runs_each:
+        if not self.gym_env.resets_each:
             raise self._not_supported("reset_mask")
         if not self._was_reset:
             raise GymServerError(

@@ -12,10 +12,11 @@ import numpy as np
 from gymnasium.spaces import Space
 from gymnasium.vector import VectorEnv
 
-from gym_server import spaces
+from gym_server import logs, spaces
 from gym_server.budget import Budget
 from gym_server.envs import make, registry, wrappers
 from gym_server.envs.drawing_on_demand import save_drawing
+from gym_server.envs.extras import engine_versions
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.quick_choice import choose_quickly
 from gym_server.instances.local import env_id_of
@@ -28,13 +29,23 @@ from gym_server.vector_envs.sub_env import ThisThread
 # fixed, because all of them share one generator. R gets it from the description.
 GROUP = 256
 
-# Environments in which a later episode differs from the first one of a new environment, because the
-# world of Box2D keeps a state. Found by playing every registered environment both ways.
-_MADE_ANEW = ("gymnasium.envs.box2d.bipedal_walker",)
+# Environments in which a later episode plays like the first one of a new environment: a test has
+# compared the two in each of them. All others are made anew for each episode. Among these is
+# BipedalWalker, because its world of Box2D keeps a state.
+_KEPT = (
+    "gymnasium.envs.classic_control",
+    "gymnasium.envs.toy_text",
+    "gymnasium.envs.box2d.lunar_lander",
+    "gymnasium.envs.box2d.car_racing",
+    "gymnasium.envs.mujoco",
+    "gymnasium.envs.phys2d",
+    "gymnasium.envs.tabular",
+    "ale_py",
+)
 
 # Environments without a time limit whose episodes always end: an Atari game ends after half an
 # hour, unless this argument changes that.
-_ENDING = ("gymnasium.envs.toy_text.blackjack", "ale_py")
+_ENDING = ("gymnasium.envs.toy_text.blackjack", "gymnasium.envs.tabular.blackjack", "ale_py")
 _ATARI_LIMIT = "max_num_frames_per_episode"
 
 # Wrappers that carry a state from one episode to the next.
@@ -57,8 +68,9 @@ class RolloutEnv:
             GymServerError: see ``make.make_env()`` and ``make_vector_env()``.
         """
         self._task = task
-        own = self._make_own()
-        self.env: Any = self._make() if own is None else own
+        with logs.hearing() as self._warnings:
+            own = self._make_own()
+            self.env: Any = self._make() if own is None else own
         self.group = None if own is None else GROUP
         prefix = "" if own is None else "single_"
         self.observation_space: Space = getattr(self.env, f"{prefix}observation_space")
@@ -87,8 +99,7 @@ class RolloutEnv:
     @cached_property
     def is_made_anew(self) -> bool:
         """Whether each episode needs a new environment."""
-        module = registry.module_of(self.env.spec)
-        return not registry.is_known(module) or module.startswith(_MADE_ANEW)
+        return not registry.module_of(self.env.spec).startswith(_KEPT)
 
     def for_an_episode(self) -> Any:
         """Return an environment that plays like a new one."""
@@ -140,7 +151,9 @@ class RolloutEnv:
                 "max_episode_steps": self.time_limit,
                 "reward_threshold": spec.reward_threshold if spec else None,
                 "render_fps": plain(metadata.get("render_fps")),
+                "engine": engine_versions(spec) if spec else {},
             },
+            "warnings": self._warnings,
             "remembers": self.remembers,
             "needs_max_steps": self.needs_max_steps,
             "group": self.group,

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server.envs.drawing import Drawing
+from gym_server.envs.registry import module_of
 from gym_server.errors import GymServerError
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import member_of
@@ -16,9 +18,26 @@ from gym_server.spaces.stacking import member_of
 # The most sub-environments of an environment that draws all of them at once.
 _MOST_DRAWN_AT_ONCE = 16
 
+# Atari's seeds are C++'s int; -1 stands for none.
+_LARGEST_SEED = 2**31 - 1
+_NO_SEED = -1
+
+
+def resets_each(spec: EnvSpec | None) -> bool:
+    """Return whether an implementation resets some sub-environments, each with its own seed."""
+    return spec is not None and module_of(spec).startswith("ale_py")
+
+
+def why_seed_too_large(seed: Any, num_envs: int) -> str | None:
+    """Return why such an implementation refuses a seed, or a tuple of one each; None if not."""
+    largest = (
+        seed + num_envs - 1 if isinstance(seed, int) else max(filter(None, seed or ()), default=0)
+    )
+    return None if largest <= _LARGEST_SEED else f"its seeds must be below {_LARGEST_SEED + 1}"
+
 
 class EntryPointEnv:
-    """An environment's own implementation, with one generator for all sub-environments.
+    """An environment's own implementation, mostly with one generator for all sub-environments.
 
     It has the attributes and methods of ``SubEnvs``.
     """
@@ -40,8 +59,11 @@ class EntryPointEnv:
         self._env: Any = env
         self.drawing = Drawing(renderer)
         self.num_envs = env.num_envs
+        self.resets_each = resets_each(env.spec)
         self.autoreset_mode: AutoresetMode = env.metadata["autoreset_mode"]
         self.ended = np.zeros(env.num_envs, dtype=bool)
+        # In mode NEXT_STEP: those whose next step starts an episode.
+        self._starting = np.zeros(env.num_envs, dtype=bool)
         self.metadata = env.metadata
         self.render_mode = env.render_mode
         self.spec = env.spec
@@ -51,23 +73,48 @@ class EntryPointEnv:
         self.action_space = env.action_space
 
     def reset(
-        self, seed: int | None, options: dict | None, mask: None, with_infos: bool = True
+        self,
+        seed: int | tuple[int | None, ...] | None,
+        options: dict | None,
+        mask: np.ndarray | None,
+        with_infos: bool = True,
     ) -> tuple[Any, dict]:
-        """Start an episode in all sub-environments."""
-        observation, info = self._env.reset(seed=seed, options=options)
-        self.ended[:] = False
+        """Start an episode in all sub-environments, or in those of a mask."""
+        which = slice(None) if mask is None else mask
+        if mask is not None:
+            options = {**(options or {}), "reset_mask": mask}
+            seed = (
+                tuple(seed + at for at in range(self.num_envs)) if isinstance(seed, int) else seed
+            )
+        own: Any = seed
+        if isinstance(seed, tuple):
+            own = np.array([_NO_SEED if one is None else one for one in seed])[which]
+        base = self._env.unwrapped
+        if hasattr(base, "prev_done"):
+            # Gymnasium's JAX implementation keeps it, and would start these episodes once more.
+            base.prev_done = np.zeros(self.num_envs, dtype=bool)
+        observation, info = self._env.reset(seed=own, options=options)
+        self.ended[which] = self._starting[which] = False
         return observation, info if with_infos else {}
 
     def step(self, which: None, actions: Any, with_infos: bool = True) -> tuple:
         """Step all sub-environments."""
-        observation, reward, terminated, truncated, info = self._env.step(actions)
+        observation, *results, info = self._env.step(actions)
+        # The environment may change its arrays in the next step, before these are sent.
+        reward, terminated, truncated = (np.array(result) for result in results)
+        done = terminated.astype(bool) | truncated.astype(bool)
         if self.autoreset_mode is AutoresetMode.DISABLED:
-            self.ended = np.asarray(terminated, dtype=bool) | np.asarray(truncated, dtype=bool)
+            self.ended = done
+        elif self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            # Gymnasium's JAX implementation pays for this step.
+            reward[self._starting] = 0
+            self._starting = done
+        if "final_obs" in info:
+            # Atari's sends no mask.
+            info.setdefault("_final_obs", done)
         if not with_infos:
             info = {name: info[name] for name in ("final_obs", "_final_obs") if name in info}
-        # The environment may change its arrays in the next step, before these are sent.
-        results = [np.array(result) for result in (reward, terminated, truncated)]
-        return observation, *results, info
+        return observation, reward, terminated, truncated, info
 
     def draw(self, sub_env: int) -> object:
         """Draw all sub-environments, and return the frame of one."""

@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server.envs import argument_limits, make
 from gym_server.envs.config import EnvConfig
+from gym_server.envs.extras import extra_of
 from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import is_known, module_of
@@ -20,12 +21,21 @@ from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.vector_envs.entry_point import EntryPointEnv
+from gym_server.vector_envs.entry_point import EntryPointEnv, resets_each, why_seed_too_large
 from gym_server.vector_envs.num_workers import choose_num_workers
 from gym_server.vector_envs.sub_env import SubEnv
 from gym_server.vector_envs.sub_envs import SubEnvs
 
 log = logging.getLogger(__name__)
+
+# Environments whose own vector implementation plays like the single one. Atari's has different
+# observations, and Gymnasium's JAX environments are not faster with theirs: their sub-environments
+# share what was compiled (copies.py), and theirs compiles anew for each number of episodes that end
+# together.
+_SAME_TASK = ("gymnasium.envs.classic_control.",)
+
+# Arguments of make_vec() that may be registered with an environment.
+_REGISTERED_BESIDE = ("num_envs", "vectorization_mode")
 
 
 def make_vector_env(
@@ -56,11 +66,14 @@ def make_vector_env(
     _check(config, cast(int, config.num_envs), max_num_envs)
     request = _request(spec, config, renderer, memory)
     with make.naming_extra(spec):
-        match config.vectorization_mode:
+        # Some environments have nothing else.
+        only = "vector_entry_point" if spec.entry_point is None else None
+        match config.vectorization_mode or only:
             case None:
-                env = _try_entry_point(request) if _is_the_same_task(request) else None
-                if env is None:
+                own = _try_entry_point(request) if _is_the_same_task(request) else None
+                if own is None:
                     return _make_sub_envs(request)
+                env = own
             case "sync" | "async":
                 return _make_sub_envs(request)
             case _:
@@ -88,6 +101,9 @@ def _request(
     spec: EnvSpec, config: EnvConfig, renderer: Any, memory: MemoryReservation
 ) -> _Request:
     kwargs, num_envs = config.kwargs or {}, cast(int, config.num_envs)
+    # What was asked for counts. Gymnasium would take the registered values instead.
+    spec = copy.copy(spec)
+    spec.kwargs = {k: v for k, v in spec.kwargs.items() if k not in _REGISTERED_BESIDE}
     argument_limits.check_environment(spec, kwargs, config.wrappers, num_envs)
     return _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
 
@@ -170,17 +186,18 @@ def _why_no_entry_point(request: _Request) -> str | None:
         return "it supports no wrappers"
     if request.kwargs.get("max_episode_steps", 1) in (-1, None):
         return "it always has a time limit"
+    if extra_of(request.spec) == "jax" and request.config.render_mode is not None:
+        return "Gymnasium cannot draw its sub-environments"
+    if resets_each(request.spec):
+        return why_seed_too_large(request.config.seed, request.num_envs)
     if isinstance(request.config.seed, tuple):
         return "it has one generator for all sub-environments, so it needs a single seed"
     return None
 
 
 def _is_the_same_task(request: _Request) -> bool:
-    """Return whether an environment's own implementation is known to play like the single one.
-
-    Gymnasium's own do. Atari's has different observations.
-    """
-    return module_of(request.spec).startswith("gymnasium.") and not _why_no_entry_point(request)
+    """Return whether an environment's own implementation is known to play like the single one."""
+    return module_of(request.spec).startswith(_SAME_TASK) and not _why_no_entry_point(request)
 
 
 def _try_entry_point(request: _Request) -> VectorEnv | None:
@@ -211,19 +228,31 @@ class _NotPossibleError(Exception):
 
 def _make_entry_point(request: _Request) -> VectorEnv:
     request.memory.reserve(vector_bytes(request.spec, request.kwargs), request.spec.id)
-    vector_spec = copy.copy(request.spec)
-    # The type is ignored: load_creator() is to load the vector environment's class.
-    vector_spec.entry_point = request.spec.vector_entry_point  # type: ignore[assignment]
-    creator = make.load_creator(vector_spec)
+    creator = make.load_creator(make.vector_spec(request.spec))
     try:
-        render_mode = make.choose_render_mode(creator, request.spec, request.config.render_mode)
+        render_mode = (
+            None
+            if extra_of(request.spec) == "jax"
+            else make.choose_render_mode(creator, request.spec, request.config.render_mode)
+        )
         env = make.make_vector_entry_point(
-            request.spec, request.num_envs, render_mode, with_tuples(creator, request.kwargs)
+            request.spec,
+            request.num_envs,
+            render_mode,
+            with_tuples(creator, request.kwargs),
+            request.autoreset_mode,
         )
     except GymServerError as refusal:
         if refusal.code in ("invalid_parameter", "invalid_kwargs"):
-            raise _NotPossibleError(refusal.message) from refusal
+            raise _NotPossibleError(_why_no_argument(request, refusal)) from refusal
+        if "Invalid autoreset_mode" in refusal.message:
+            wanted = request.autoreset_mode.value
+            raise _NotPossibleError(f"its autoreset_mode cannot be {wanted}") from refusal
         raise
+    if env.num_envs != request.num_envs:
+        made = env.num_envs
+        env.close()
+        raise _NotPossibleError(f"it makes {made} sub-environments, not {request.num_envs}")
     mode = env.metadata.get("autoreset_mode")
     if mode != request.autoreset_mode:
         env.close()
@@ -235,6 +264,16 @@ def _make_entry_point(request: _Request) -> VectorEnv:
         env.close()
         raise
     return env
+
+
+def _why_no_argument(request: _Request, refusal: GymServerError) -> str:
+    """Say what limits an episode of Atari's games, whose implementation counts frames."""
+    if resets_each(request.spec) and "'max_episode_steps'" in refusal.message:
+        return (
+            "it counts frames and not steps: use max_num_frames_per_episode, of which a step takes "
+            "as many as its frameskip"
+        )
+    return refusal.message
 
 
 def _with_time_limit(request: _Request) -> EnvSpec:

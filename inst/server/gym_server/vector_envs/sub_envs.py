@@ -57,7 +57,7 @@ class SubEnvs:
     """
 
     # Each has its own seed and resets, and some can step while the others wait.
-    runs_each = True
+    resets_each = runs_each = True
 
     def __init__(
         self,

@@ -14,7 +14,8 @@ def test_the_hints_name_what_the_package_declares():
     declared = project["optional-dependencies"]
     for name, requirements in extras.REQUIREMENTS.items():
         assert [one.partition(">")[0] for one in declared[name]] == list(requirements)
-    together = declared["all"][0]
+    # JAX takes as much disk as all others together, so it is left out.
+    together = declared["all"][0] + "jax"
     assert all(name in together for name in extras.REQUIREMENTS)
 
 

@@ -116,11 +116,18 @@ def test_another_id_is_no_atari_game(env_id):
 
 
 def test_what_cannot_be_made_in_any_way_is_not_offered():
-    # phys2d/CartPole-v1 needs jax, which no extra installs.
-    assert "phys2d" not in refusal("CartPol-v1").hint
-    refused = refusal("phys2d/CartPole-v1")
+    assert "Pusher-v4" not in (refusal("Pushr-v4").hint or "")
+    assert "Pusher-v2" not in (refusal("Pushr-v2").hint or "")
+
+
+@pytest.mark.parametrize("env_id", ["Pusher-v4", "Ant-v2"])
+def test_what_cannot_be_made_gives_the_reason_of_the_registry(env_id, monkeypatch):
+    pytest.importorskip("mujoco")
+    reason = registry.search(env_id, ())[0]["reason"]
+    assert reason is not None
+    refused = refusal(env_id)
     assert refused.code == "missing_dependency"
-    assert "'jax', which no extra" in refused.message
+    assert refused.message == f"{env_id} cannot be made: {reason}"
 
 
 def test_an_id_that_is_like_nothing_gets_no_hint():

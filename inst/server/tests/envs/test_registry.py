@@ -1,3 +1,4 @@
+import functools
 import importlib.metadata
 import json
 import re
@@ -7,6 +8,7 @@ import sys
 import gymnasium
 import pytest
 from conftest import SERVER
+from gymnasium.envs.classic_control.cartpole import CartPoleEnv, CartPoleVectorEnv
 
 from gym_server.envs import registry
 
@@ -53,7 +55,7 @@ print(json.dumps([registry.search(env_id, [])[0]["reason"] for env_id in ids]))
 """
     assert python(hidden(*modules) + code) == [
         "it needs the server's extra 'box2d'",
-        "it needs the Python package 'jax', which no extra installs",
+        "it needs the server's extra 'jax'",
         "it needs the Python package 'no_such_package', which no extra installs",
     ]
 
@@ -62,6 +64,53 @@ def test_an_environment_of_an_older_mujoco_says_so(client, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.setattr(importlib.metadata, "version", lambda package: "3.2.1")
     assert found(client, search="Pusher-v4")[0]["reason"] == "it needs a MuJoCo before version 3"
+
+
+def test_half_of_an_extra_is_not_enough():
+    # Without flax, Gymnasium's JAX environments cannot be imported.
+    code = """
+import json, sys, types
+sys.modules["jax"] = types.ModuleType("jax")
+sys.modules["flax"] = None
+from gym_server.envs import registry
+print(json.dumps(registry.search("phys2d/CartPole-v1", [])[0]["reason"]))
+"""
+    assert python(code) == "it needs the server's extra 'jax'"
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    """Register an environment for a test."""
+
+    def registered(env_id, **how):
+        spec = gymnasium.envs.registration.EnvSpec(env_id, **how)
+        monkeypatch.setitem(gymnasium.registry, env_id, spec)
+
+    return registered
+
+
+def test_what_a_partial_function_makes_can_be_made_and_breaks_no_search(client, registered):
+    maker = functools.partial(CartPoleEnv, sutton_barto_reward=True)
+    registered("Partial-v0", entry_point=maker)
+    assert found(client, search="Partial-v0")[0]["available"] is True
+    assert registry.module_of(gymnasium.spec("Partial-v0")) == CartPoleEnv.__module__
+    assert (
+        client.post("/v1/envs/", json={"env_id": "Partial-v0"}).json["render_mode"] == "rgb_array"
+    )
+    answer = client.post("/v1/envs/", json={"env_id": "CartPol-v1"})
+    assert (answer.status_code, answer.json["code"]) == (400, "unknown_env_id")
+
+
+def test_what_is_only_a_vector_environment_is_made_with_num_envs(client, registered):
+    registered("OnlyVector-v0", vector_entry_point=CartPoleVectorEnv, max_episode_steps=9)
+    assert found(client, search="OnlyVector-v0")[0]["available"] is True
+    made = client.post("/v1/envs/", json={"env_id": "OnlyVector-v0", "num_envs": 2}).json
+    assert made["vectorization_mode"] == "vector_entry_point"
+    assert made["max_episode_steps"] == 9
+    for fields in ({}, {"num_envs": 2, "vectorization_mode": "sync"}):
+        answer = client.post("/v1/envs/", json={"env_id": "OnlyVector-v0", **fields})
+        assert (answer.status_code, answer.json["code"]) == (400, "not_supported")
+        assert "num_envs" in answer.json["hint"]
 
 
 @pytest.mark.parametrize("text", ["cartpole", "CARTPOLE-v", "artPole"])

@@ -213,6 +213,11 @@ def test_all_about_an_instance(client, create):
         "name": None,
         "reward_threshold": 195.0,
         "max_episode_steps": 200,
+        "engine": {},
+        "warnings": [
+            "The environment CartPole-v0 is out of date. You should consider upgrading to version "
+            "`v1`."
+        ],
         "render_fps": 50,
         "num_envs": None,
         "vectorization_mode": None,

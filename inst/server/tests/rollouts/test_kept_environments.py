@@ -4,12 +4,17 @@
 """
 
 import environments
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.classic_control.cartpole import CartPoleVectorEnv
+from gymnasium.envs.registration import EnvSpec
 
 from gym_server.envs.config import EnvConfig, Wrapper
+from gym_server.policies import read_policy
 from gym_server.rollouts import environment
-from gym_server.rollouts.task import Task
+from gym_server.rollouts.group import play_group
+from gym_server.rollouts.task import Keep, Task, Unit
 
 LEFT_OUT = environments.ATARI if environments.ALL else environments.ATARI | environments.older()
 OTHERS = [env_id for env_id in environments.runnable() if env_id not in LEFT_OUT]
@@ -32,18 +37,19 @@ def episode(env, seed):
     return seen
 
 
-def task(env_id):
+def task(env_id, kwargs, wrappers):
     # Environments with wrappers are not played in groups.
     limit = Wrapper("TimeLimit", {"max_episode_steps": 10_000})
-    return Task(EnvConfig(env_id, wrappers=(limit,)), frozenset(), np.inf)
+    config = EnvConfig(env_id, kwargs=kwargs, wrappers=(*wrappers, limit))
+    return Task(config, frozenset(), np.inf)
 
 
-def differs(env_id):
+def differs(env_id, kwargs=None, wrappers=()):
     """Return whether the third episode of an environment differs from that in a new one."""
-    kept = environment.RolloutEnv(task(env_id))
+    kept = environment.RolloutEnv(task(env_id, kwargs, wrappers))
     for seed in (1, 2):
         episode(kept.for_an_episode(), seed)
-    new = environment.RolloutEnv(task(env_id))
+    new = environment.RolloutEnv(task(env_id, kwargs, wrappers))
     first, second = episode(kept.for_an_episode(), 3), episode(new.for_an_episode(), 3)
     kept.close()
     new.close()
@@ -61,6 +67,79 @@ def test_a_kept_one_plays_as_a_new_one(env_id):
     assert not differs(env_id)
 
 
-def test_only_those_are_made_anew_that_must_be(monkeypatch):
-    monkeypatch.setattr(environment, "_MADE_ANEW", ("nothing",))
+def test_bipedal_walker_must_be_made_anew(monkeypatch):
+    monkeypatch.setattr(environment, "_KEPT", ("gymnasium.envs.box2d",))
     assert differs("BipedalWalker-v3")
+
+
+class Remembering(gymnasium.Env):
+    """Observes how many episodes it has played, like nothing that Gymnasium has."""
+
+    observation_space = gymnasium.spaces.Discrete(9)
+    action_space = gymnasium.spaces.Discrete(2)
+    episodes = 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.episodes += 1
+        return self.episodes, {}
+
+    def step(self, action):
+        return self.episodes, 0.0, True, False, {}
+
+
+def test_what_no_test_has_compared_is_made_anew(monkeypatch):
+    # As if a later Gymnasium had it.
+    monkeypatch.setattr(Remembering, "__module__", "gymnasium.envs.later.remembering")
+    spec = EnvSpec("Remembering-v0", entry_point=Remembering)
+    monkeypatch.setitem(gymnasium.registry, "Remembering-v0", spec)
+    assert not differs("Remembering-v0")
+
+
+P = "Pendulum-v1"
+CHANGED = [
+    ("LunarLander-v3", {"enable_wind": True}, ()),
+    ("Taxi-v4", {"is_rainy": True, "fickle_passenger": True}, ()),
+    ("CliffWalking-v1", {"is_slippery": True}, ()),
+    (P, {}, Wrapper("AddWhiteNoise", {"probability_of_noise_per_pixel": 0.5})),
+    (P, {}, Wrapper("DelayObservation", {"delay": 3})),
+    (P, {}, Wrapper("FrameStackObservation", {"stack_size": 4})),
+    (P, {}, Wrapper("RecordEpisodeStatistics", {})),
+    (P, {}, Wrapper("RepeatAction", {"num_repeats": 3})),
+    (P, {}, Wrapper("StickyAction", {"repeat_action_probability": 0.5})),
+    (P, {}, Wrapper("TimeAwareObservation", {})),
+    ("CartPole-v1", {}, Wrapper("MaxAndSkipObservation", {"skip": 4})),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("env_id", "kwargs", "wrapper"), CHANGED)
+def test_one_with_arguments_or_wrappers_that_keep_something_plays_as_a_new_one(
+    env_id, kwargs, wrapper
+):
+    assert not differs(env_id, kwargs, (wrapper,) if wrapper else ())
+
+
+def test_a_kept_group_plays_as_a_new_one():
+    task = Task(EnvConfig("CartPole-v1"), frozenset(), np.inf)
+
+    def play(env, seed):
+        actor = read_policy({"kind": "random"}, {}, env.observation_space, env.action_space).actor(
+            np.zeros(env.group, dtype=int)
+        )
+        unit = Unit(seed, (0,) * 20, tuple(range(20)))
+        return play_group(env.env, actor, unit, 60, Keep())["length"].array().tolist()
+
+    kept = environment.RolloutEnv(task)
+    first = play(kept, 1)
+    play(kept, 2)
+    assert play(kept, 1) == first
+
+
+def test_no_implementation_plays_in_groups_that_no_test_has_compared(monkeypatch):
+    later = type("Later", (CartPoleVectorEnv,), {"__module__": "gymnasium.envs.later.cartpole"})
+    spec = EnvSpec("Later-v0", entry_point=Remembering, vector_entry_point=later)
+    monkeypatch.setattr(Remembering, "__module__", "gymnasium.envs.later.remembering")
+    monkeypatch.setitem(gymnasium.registry, "Later-v0", spec)
+    env = environment.RolloutEnv(Task(EnvConfig("Later-v0"), frozenset(), np.inf))
+    assert env.group is None

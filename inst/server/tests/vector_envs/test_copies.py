@@ -8,6 +8,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import RecordEpisodeStatistics
 
 from gym_server.envs.config import Wrapper
+from gym_server.envs.extras import is_available
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
@@ -27,6 +28,7 @@ KWARGS = {
     "Taxi": [{"is_rainy": True, "fickle_passenger": True}],
 }
 TOY_TEXT = [spec for spec in REGISTERED if family(spec) == "toy_text"]
+JAX = [spec for spec in REGISTERED if family(spec) in ("phys2d", "tabular") and is_available(spec)]
 CASES = [(spec.id, kwargs) for spec in TOY_TEXT for kwargs in [{}, *KWARGS.get(spec.name, [])]]
 
 
@@ -104,6 +106,31 @@ def test_a_group_of_copies_resets_each_with_its_seed():
     observations, _ = group.reset(range(5), range(5), [None] * 5, None)
     new = gymnasium.make("Taxi-v4")
     assert observations.tolist() == [new.reset(seed=seed)[0] for seed in range(5)]
+
+
+@pytest.mark.parametrize("spec", JAX, ids=lambda spec: spec.id)
+def test_copies_share_what_jax_compiled_and_play_as_new_ones(spec):
+    copies = made_by(spec)
+    assert all(env.unwrapped.func_env is copies[0].unwrapped.func_env for env in copies)
+
+    def play(env):
+        env.action_space.seed(1)
+        came = [env.reset(seed=5)[0]]
+        for _ in range(20):
+            step = env.step(env.action_space.sample())
+            came += [step[0], step[1], step[2]]
+            if step[2]:
+                came.append(env.reset()[0])
+        return [np.asarray(one).tolist() for one in came]
+
+    first, *_, last = [play(env) for env in copies]
+    assert first == last == play(made_new(spec.id, 1)[0])
+
+
+@pytest.mark.parametrize("spec", JAX, ids=lambda spec: spec.id)
+def test_copies_on_jax_without_seeds_are_independent(spec):
+    generators = {str(env.unwrapped.rng) for env in made_by(spec, 4)}
+    assert len(generators) == 4
 
 
 # Environments that are not copied -------------------------------------------------------------

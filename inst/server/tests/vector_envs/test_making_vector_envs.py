@@ -4,6 +4,8 @@ import types
 import gymnasium
 import pytest
 from faulty_envs import Counting
+from gymnasium.envs.classic_control.cartpole import CartPoleEnv, CartPoleVectorEnv
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from gym_server.api.app import Config, create_app
@@ -213,6 +215,122 @@ def test_an_environment_that_cannot_be_made_says_why(client, mode):
 def test_arguments_cannot_change_what_was_chosen(client):
     for name in ("num_envs", "vectorization_mode", "vector_kwargs", "wrappers"):
         assert refused(client, kwargs={name: 3})["code"] == "invalid_kwargs"
+
+
+def test_the_number_that_was_asked_for_counts_and_not_the_registered_one(client, monkeypatch):
+    spec = EnvSpec(
+        "Registered-v0",
+        entry_point=CartPoleEnv,
+        vector_entry_point=CartPoleVectorEnv,
+        max_episode_steps=9,
+        kwargs={"num_envs": 4},
+    )
+    monkeypatch.setitem(gymnasium.registry, "Registered-v0", spec)
+    for mode in ("vector_entry_point", "sync"):
+        fields = {"env_id": "Registered-v0", "num_envs": 2, "vectorization_mode": mode}
+        url = f"/v1/envs/{client.post('/v1/envs/', json=fields).json['instance_id']}"
+        assert len(client.post(f"{url}/reset/").json["observation"]) == 2
+
+
+def test_an_implementation_that_makes_another_number_is_refused(client, monkeypatch):
+    four = EnvSpec("Four-v0", vector_entry_point=lambda num_envs: OwnSubEnvs(4))
+    monkeypatch.setitem(gymnasium.registry, "Four-v0", four)
+    refusal = refused(client, env_id="Four-v0", autoreset_mode="SameStep")
+    assert refusal["message"].endswith("it makes 4 sub-environments, not 2")
+
+
+# Atari's own implementation -------------------------------------------------------------------
+
+
+@pytest.fixture
+def atari(client):
+    """Make Pong by Atari's own implementation, with short episodes; return its URL."""
+    pytest.importorskip("ale_py")
+
+    def atari(num_envs=2, **fields):
+        answer = client.post(
+            "/v1/envs/",
+            json={
+                "env_id": "ALE/Pong-v5",
+                "num_envs": num_envs,
+                "vectorization_mode": "vector_entry_point",
+                "kwargs": {"max_num_frames_per_episode": 60, "noop_max": 30, "stack_num": 1},
+                **fields,
+            },
+        )
+        assert answer.status_code == 200, answer.json
+        return f"/v1/envs/{answer.json['instance_id']}"
+
+    return atari
+
+
+def frames(client, url, **fields):
+    answer = client.post(f"{url}/reset/", json=fields)
+    assert answer.status_code == 200, answer.json
+    return answer.json["info"]["episode_frame_number"]
+
+
+@pytest.mark.slow
+def test_atari_takes_a_seed_for_each_sub_environment(client, atari):
+    url = atari(seed=[5, 5])
+    first, second = frames(client, url)
+    assert first == second
+    first, second = frames(client, url, seed=[5, None])
+    assert first != frames(client, url, seed=6)[0]
+
+
+@pytest.mark.slow
+def test_atari_resets_those_of_a_mask(client, atari):
+    url = atari()
+    frames(client, url, seed=1)
+    client.post(f"{url}/step/", json={"action": [0, 0]})
+    before = client.post(f"{url}/step/", json={"action": [0, 0]}).json["info"]
+    after = frames(client, url, seed=[None, 3], reset_mask=[False, True])
+    assert after[0] == before["episode_frame_number"][0]
+    assert after[1] < before["episode_frame_number"][1]
+
+
+@pytest.mark.slow
+def test_atari_resets_in_the_same_step(client, atari):
+    url = atari(autoreset_mode="SameStep")
+    frames(client, url, seed=[1, 1])
+    answer = {"done": [False]}
+    while not any(answer["done"]):
+        answer = client.post(f"{url}/step/", json={"action": [0, 0]}).json
+    assert answer["truncated"] == [True, True]
+    assert answer["final_sub_envs"] == [0, 1]
+    assert answer["info"]["episode_frame_number"][0] < 60
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"autoreset_mode": "Disabled"}, "its autoreset_mode cannot be Disabled"),
+        ({"seed": 2**31 - 1}, "its seeds must be below 2147483648"),
+        ({"seed": [1, 2**31]}, "its seeds must be below 2147483648"),
+        ({"kwargs": {"max_episode_steps": 9}}, "use max_num_frames_per_episode"),
+    ],
+)
+def test_what_atari_cannot_do_is_said(client, fields, words):
+    pytest.importorskip("ale_py")
+    mode = "vector_entry_point"
+    refusal = refused(client, env_id="ALE/Pong-v5", vectorization_mode=mode, **fields)
+    assert (refusal["code"], words in refusal["message"]) == ("not_supported", True)
+
+
+def test_a_seed_that_is_too_large_for_atari_is_refused_before_the_reset(client, atari):
+    answer = client.post(f"{atari()}/reset/", json={"seed": [1, 2**31]})
+    assert (answer.status_code, answer.json["code"]) == (400, "invalid_parameter")
+    assert "below 2147483648" in answer.json["message"]
+
+
+def test_an_argument_of_the_vector_implementation_says_so(client):
+    pytest.importorskip("ale_py")
+    refusal = refused(client, env_id="ALE/Pong-v5", kwargs={"reward_clipping": False})
+    assert refusal["message"] == (
+        "Only the vector implementation of ALE/Pong-v5 has an argument 'reward_clipping'"
+    )
+    assert "vector_entry_point" in refusal["hint"]
 
 
 # How many processes ---------------------------------------------------------------------------
