@@ -50,7 +50,12 @@ is_running <- function(base) {
 #'   `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
 #'   the machine can then use the server, as a message of class `gym_message_open_server` says.
 #'   `token_file`, `no_auth = TRUE` and the environment variable `GYM_SERVER_TOKEN` take precedence.
-#' @return A client for the server, as returned by [create_GymClient()].
+#' @param users Path of a file with a name and a token on each line, a string, or `NULL`. With it
+#'   each user gets a server of their own, as described in `vignette("server", package = "gym")`:
+#'   nobody can see, step or close what another has. The file must be readable by you alone, and is
+#'   read again when it changes. Not available on Windows.
+#' @return A client for the server, as returned by [create_GymClient()]. With `users` it has the
+#'   token of `GYM_SERVER_TOKEN`, or none; users call [create_GymClient()] with their own.
 #' @section Errors: `gym_error_server_start`, with the server's own message, if no Python can run
 #'   it, the port is taken or the start takes too long. `gym_error_install` if a Python environment
 #'   could not be installed. `gym_error_argument`.
@@ -61,15 +66,22 @@ is_running <- function(base) {
 #' env_list_all(server)
 #' gym_server_stop(server)
 gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
-                             token = is.null(port)) {
+                             token = is.null(port) && is.null(users), users = NULL) {
   # Evaluate the token first: any later error would show the call with it.
   check_own_token(token)
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
-  options <- list(...)
+  check_string(users, allow_null = TRUE)
+  if (token && !is.null(users)) {
+    gym_abort(
+      "`token = TRUE` and `users` exclude each other: `users` has a token for each user.",
+      class = "gym_error_argument", argument = "token"
+    )
+  }
+  options <- c(list(...), if (!is.null(users)) list(users = users))
   client <- start_server(port, python, options, timeout, token)
-  if (missing(token) && is.null(client$token) && !isTRUE(options$no_auth)) {
+  if (missing(token) && is.null(client$token) && !isTRUE(options$no_auth) && is.null(users)) {
     cli::cli_inform(
       c(i = paste("The server at {client$remote_base} requires no token: any account of this",
                   "machine can use it.")),
@@ -101,8 +113,10 @@ check_own_token <- function(token, call = rlang::caller_env()) {
 #' @noRd
 start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60, token = TRUE,
                          install = TRUE, call = rlang::caller_env()) {
-  if (rlang::is_string(options$token_file)) {
-    options$token_file <- path.expand(options$token_file)
+  for (name in c("token_file", "users")) {
+    if (rlang::is_string(options[[name]])) {
+      options[[name]] <- path.expand(options[[name]])
+    }
   }
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),

@@ -17,8 +17,13 @@ make_certificate <- function(folder) {
 }
 
 # The package's file with other places and ports, inside what a distribution's nginx.conf has.
-write_nginx_conf <- function(folder, port, server_port) {
+write_nginx_conf <- function(folder, port, server_port, keepalive) {
   ours <- readLines(system.file("examples", "nginx.conf", package = "gym"))
+  if (!keepalive) {
+    kept <- grepl("^    keepalive( 64|_timeout 10s);$", ours)
+    testthat::expect_identical(sum(kept), 2L)
+    ours <- ours[!kept]
+  }
   changes <- c(
     "/etc/ssl/gym" = folder, "/var/log/nginx" = folder,
     "server 127.0.0.1:5000" = paste0("server 127.0.0.1:", server_port),
@@ -39,15 +44,16 @@ write_nginx_conf <- function(folder, port, server_port) {
 }
 
 #' Start an nginx before a server
+#' @param keepalive Does it keep connections to the server, as the file says without `--users`?
 #' @return A list of `url`, the `config` of httr's that takes its certificate and its name for this
 #'   machine's, and `folder`, where it writes.
 #' @noRd
-local_proxy <- function(server, frame = parent.frame()) {
+local_proxy <- function(server, keepalive = TRUE, frame = parent.frame()) {
   skip_if_no_nginx()
   folder <- withr::local_tempdir(.local_envir = frame)
   port <- free_port()
   certificate <- make_certificate(folder)
-  conf <- write_nginx_conf(folder, port, sub(".*:", "", server$remote_base))
+  conf <- write_nginx_conf(folder, port, sub(".*:", "", server$remote_base), keepalive)
   nginx <- processx::process$new(
     Sys.which("nginx"), c("-c", conf, "-p", folder),
     stdout = NULL, stderr = file.path(folder, "errors")

@@ -105,6 +105,18 @@ local_cut_client <- function(server, when, pattern, times = 1, frame = parent.fr
 # For another address of a server, or another process.
 token_of <- function(client) if (!is.null(client$token)) client$token()
 
+# The tokens of two users, and a server with one for each of them.
+user_tokens <- c(anna = "token-of-anna-0123456789", ben = "token-of-ben-0123456789")
+
+local_users_server <- function(..., frame = parent.frame()) {
+  skip_on_os("windows")
+  file <- withr::local_tempfile(
+    lines = paste(names(user_tokens), user_tokens), .local_envir = frame
+  )
+  Sys.chmod(file, "600")
+  local_server(users = file, ..., frame = frame)
+}
+
 # A port on which nobody listens.
 free_port <- function() {
   for (port in sample(20000:40000)) {

@@ -76,6 +76,22 @@ test_that("by nginx the watch page waits for what is new, and no log has its key
   expect_false(any(grepl(key, c(log, gym_server_log(server)), fixed = TRUE)))
 })
 
+test_that("by nginx without keepalive two users play on servers of their own", {
+  skip_unless_all()
+  skip_if_no_nginx()
+  server <- local_users_server(allow_host = "gym.example.org")
+  proxy <- local_proxy(server, keepalive = FALSE)
+  users <- lapply(user_tokens, function(token) {
+    create_GymClient(proxy$url, config = proxy$config, token = token)
+  })
+  expect_identical(await_answer(users$anna)$status, "ok")
+  envs <- lapply(users, function(user) local_env(client = user))
+  for (time in 1:5) {
+    for (env in envs) env$reset(seed = 1)
+  }
+  expect_named(env_list_all(users$ben), envs$ben$instance_id)
+})
+
 test_that("the systemd unit is one that systemd takes", {
   skip_if(!nzchar(Sys.which("systemd-analyze")), "there is no systemd here")
   unit <- readLines(system.file("examples", "gym-server.service", package = "gym"))

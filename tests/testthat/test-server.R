@@ -258,3 +258,32 @@ test_that("a session whose temporary folder was deleted starts a server", {
   )
   expect_identical(run[c("stdout", "stderr")], list(stdout = "0", stderr = ""))
 })
+
+test_that("with `users` each user has a server that ends with the session's", {
+  skip_unless_all()
+  withr::local_envvar(GYM_SERVER_TOKEN = NA)
+  expect_no_message(server <- local_users_server(port = free_port()))
+  expect_error(env_list_all(server), "asks everybody", class = "gym_error_http_401")
+  users <- lapply(user_tokens, function(token) create_GymClient(server$remote_base, token = token))
+  pids <- vapply(users, function(user) get_request(user, "/v1/health/")$pid, 1L)
+  env <- gym_make("CartPole-v1", client = users$anna)
+  expect_length(env_list_all(users$ben), 0)
+  expect_error(env_step(users$ben, env$instance_id, 0), class = "gym_error_http_400")
+  # A user stops their own server only, and the next call starts another.
+  shutdown_server(users$ben)
+  expect_length(env_list_all(users$ben), 0)
+  expect_length(env_list_all(users$anna), 1)
+  gym_server_stop(server)
+  expect_false(any(vapply(pids, pid_runs, NA)))
+})
+
+test_that("a users file that others can read, and a token besides, are refused with the fix", {
+  skip_if_no_server()
+  skip_on_os("windows")
+  file <- withr::local_tempfile(lines = "anna token-of-anna-0123456789")
+  Sys.chmod(file, "644")
+  expect_error(gym_server_start(users = file), "chmod 600", class = "gym_error_server_start")
+  expect_error(gym_server_start(users = 1), class = "gym_error_argument")
+  expect_error(gym_server_start(users = file, token = TRUE), "exclude",
+               class = "gym_error_argument")
+})

@@ -51,6 +51,7 @@ class Config:
         access: which requests the server accepts.
         client_stop: whether clients may stop it.
         allowed_paths: directories with files that kwargs may name; None for any path.
+        watch_prefix: what the keys of watch pages begin with.
     """
 
     monitor_dir: Path | None = None
@@ -64,6 +65,7 @@ class Config:
     access: Access = field(default_factory=Access)
     client_stop: bool = True
     allowed_paths: Collection[Path] | None = None
+    watch_prefix: str = ""
 
 
 class GymApp(Flask):
@@ -90,7 +92,7 @@ class GymApp(Flask):
             Isolation(config.isolate, config.max_worker_mb),
             AllowedPaths(config.allowed_paths),
         )
-        watch_keys = WatchKeys()
+        watch_keys = WatchKeys(prefix=config.watch_prefix)
         self._guard = Guard(config.access, watch_keys)
         pool.most_mb = config.limits.max_memory_mb + OWN_MB
         self._rollouts = Rollouts(config.limits.rollout_processes)

@@ -14,12 +14,22 @@ KEY_SECONDS = 600
 
 _MOST_KEYS = 10_000
 
+# The environment variable with what all keys of this server begin with. By it the front of a group
+# of servers (--users) knows whose page a key opens.
+PREFIX_VARIABLE = "GYM_SERVER_WATCH_PREFIX"
+
 
 class WatchKeys:
     """The valid keys, each for one environment's page."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Start without keys."""
+    def __init__(self, clock: Callable[[], float] = time.monotonic, prefix: str = "") -> None:
+        """Start without keys.
+
+        Args:
+            clock: the time in seconds.
+            prefix: what all keys begin with.
+        """
+        self._prefix = prefix
         self._clock = clock
         self._lock = threading.Lock()
         # By digest, so that keys can neither be read here nor guessed from the time of a
@@ -28,7 +38,7 @@ class WatchKeys:
 
     def make(self, instance_id: str) -> str:
         """Make a new key to an instance's page."""
-        key = secrets.token_urlsafe(24)
+        key = self._prefix + secrets.token_urlsafe(24)
         with self._lock:
             self._drop_old()
             self._keys[_digest(key)] = (instance_id, self._clock() + KEY_SECONDS)

@@ -17,12 +17,14 @@ from pathlib import Path
 from gym_server import logs
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
+from gym_server.api.watch_keys import PREFIX_VARIABLE
 from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.own_log import keep_short
 from gym_server.cli.port_holder import port_holder
 from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token, new_token
+from gym_server.cli.users import BadUsersError, make_front
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
 from gym_server.processes import memory, start
@@ -54,6 +56,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     logs.set_up(options.log_level.upper())
+    if options.users is not None:
+        return _serve_users(options)
     try:
         token = _find_token(options)
     except BadTokenError as fault:
@@ -89,25 +93,48 @@ def main(argv: Sequence[str] | None = None) -> int:
             access=Access(token, options.host, options.allow_host),
             client_stop=not options.no_shutdown,
             allowed_paths=None if is_private else options.allow_path,
+            watch_prefix=os.environ.pop(PREFIX_VARIABLE, ""),
         )
     )
     server = Server(app, listener, max_body_bytes, Budget(_LARGEST_BODIES * max_body_bytes))
     stop.server = server
     app.answer_for = server.answer_for
+    if options.own_token:
+        print(f"Token: {token}", flush=True)
+    _begin(options, server.port, stop)
+    _serve(app, server)
+    return 0
+
+
+def _serve_users(options: argparse.Namespace) -> int:
+    """Serve each user by a server of their own."""
+    allow_many_open_files()
+    try:
+        listener = bind(options.host, options.port)
+    except OSError as error:
+        return _fail(_why_not(error, options))
+    with listener:
+        try:
+            front = make_front(options, listener)
+        except BadUsersError as fault:
+            return _fail(str(fault))
+        _begin(options, front.port, front.stop)
+        front.run()
+    return 0
+
+
+def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> None:
+    """Do what remains before serving: signals, the log, and the line with the address."""
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop, options.own_log), daemon=True).start()
     if options.own_log is not None:
         threading.Thread(target=keep_short, args=(options.own_log,), daemon=True).start()
     memory.prepare()
-    if options.own_token:
-        print(f"Token: {token}", flush=True)
-    print(f"Server starting at: http://{_in_url(options.host)}:{server.port}", flush=True)
+    print(f"Server starting at: http://{_in_url(options.host)}:{port}", flush=True)
     # Redirect standard output to standard error: output of environments must not fill a pipe that
     # nobody reads.
     os.dup2(2, 1)
-    _serve(app, server)
-    return 0
 
 
 def _find_token(options: argparse.Namespace) -> str | None:

@@ -189,6 +189,14 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         f"this option, the variable {VARIABLE} may contain it",
     )
     options.add_argument(
+        "--users",
+        type=Path,
+        metavar="FILE",
+        help="contains a name and a token on each line: each user gets a server of their own, with "
+        "all limits for itself, which starts at the first request and ends when it was unused for "
+        "--idle-minutes; read again when it changes",
+    )
+    options.add_argument(
         "--own-token",
         action="store_true",
         help="generate a token, and print it before the address: for a single user, who may do "

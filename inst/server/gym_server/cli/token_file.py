@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
-import re
 import secrets
 import stat
 from collections.abc import MutableMapping
 from pathlib import Path
 
+from gym_server import tokens
+
 log = logging.getLogger(__name__)
 
 VARIABLE = "GYM_SERVER_TOKEN"
-
-# The format of a token, so that it fits into a header and cannot be guessed.
-_TOKEN = re.compile("[!-~]{16,1024}")
 
 
 class BadTokenError(Exception):
@@ -48,18 +46,10 @@ def new_token() -> str:
 
 def _checked(text: str, place: str) -> str:
     token = text.strip()
-    if _TOKEN.fullmatch(token) is None:
-        raise BadTokenError(
-            f"{place} must contain a token of 16 to 1,024 visible ASCII characters, but it has "
-            f"{_fault(token)}"
-        )
+    fault = tokens.fault(token)
+    if fault is not None:
+        raise BadTokenError(f"{place} must contain a token of {tokens.WANTED}, but it has {fault}")
     return token
-
-
-def _fault(token: str) -> str:
-    if len(token) < 16:
-        return f"{len(token)}"
-    return "more" if len(token) > 1024 else "other characters"
 
 
 def _warn_of_readers(file: Path) -> None:

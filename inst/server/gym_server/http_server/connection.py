@@ -203,6 +203,8 @@ class Connection:
             # answer_for() has answered, because it took too long.
             return False
         keep = request.keep_alive and self._is_recognized and not self._stopping
+        # The connection may be one that a proxy shares among clients with servers of their own.
+        keep = keep and response.status != HTTPStatus.UNAUTHORIZED
         self._sends_no_store = _NO_STORE in response.headers
         head, body = _head(response, keep), b"" if request.method == "HEAD" else response.body
         # One send() where the copy is cheap: a second one would arrive later.

@@ -1,0 +1,9 @@
+"""A server for each user, behind one address.
+
+The front process reads the head of a connection's first request, finds the user by the token,
+starts that user's own server if it does not run, and then passes bytes both ways. Each server
+checks the token of every request itself, so the front decides only where bytes go.
+
+It is one loop of one thread. It imports nothing but Python's standard library, because everybody
+who reaches its port talks to it before showing a token.
+"""
