@@ -12,7 +12,7 @@ client_state <- function(client) {
     # number for an instance, and a script may make a client for each call.
     place <- paste(client$remote_base, Sys.getpid())
     keys <- the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
-    connection <- new_connection(keys)
+    connection <- new_connection(keys, fetch_with_token_of(client))
     suspendInterrupts({
       state$connection <- connection
       state$session_config <- getOption("httr_config")
@@ -58,6 +58,21 @@ inner_connection <- function(connection) {
     connection <- connection$inner
   }
   connection
+}
+
+# The function that performs a client's requests. curl_fetch_memory() has one pool, so clients share
+# connections. On a server for each user, a connection belongs to one token: the first token of an
+# address uses that pool, and clients with another one have their own.
+fetch_with_token_of <- function(client) {
+  if (is.null(client$token)) {
+    return(curl::curl_fetch_memory)
+  }
+  digest <- rlang::hash(client$token())
+  first <- the_session$token_digests[[client$remote_base]]
+  if (is.null(first)) {
+    the_session$token_digests[[client$remote_base]] <- digest
+  }
+  if (identical(first %||% digest, digest)) curl::curl_fetch_memory else fetch_in_own_pool()
 }
 
 # Makes a function like curl_fetch_memory() with its own pool. The single pool of

@@ -85,7 +85,7 @@ test_that("by nginx without keepalive two users play on servers of their own", {
     create_GymClient(proxy$url, config = proxy$config, token = token)
   })
   expect_identical(await_answer(users$anna)$status, "ok")
-  envs <- lapply(users, function(user) local_env(client = user))
+  envs <- lapply(users, function(user) gym_make("CartPole-v1", client = user))
   for (time in 1:5) {
     for (env in envs) env$reset(seed = 1)
   }
