@@ -99,6 +99,30 @@ read_space <- function(answer, name, space_of) {
   )
 }
 
+#' Find out whether an instance has ended with its server
+#'
+#' The process of a server of this session is known. An object that comes from another session, such
+#' as by `readRDS()`, asks the server.
+#' @param pid The process in which the instance was made.
+#' @return What has ended, in words; `NULL` if nothing has.
+#' @noRd
+end_of_instance <- function(client, instance_id, pid) {
+  base <- client$remote_base
+  if (!is.null(the_session$servers[[base]])) {
+    return(if (!is_running(base)) "on a server that has ended")
+  }
+  if (!identical(pid, Sys.getpid())) {
+    gone <- function(cnd) "in a session that has ended"
+    tryCatch(
+      {
+        get_answer(client, instance_route(instance_id))
+        NULL
+      },
+      gym_error_connection = gone, gym_error_http_401 = gone, gym_error_http_404 = gone
+    )
+  }
+}
+
 # Makes an instance from the server's description, after creating it or on request.
 new_instance <- function(client, instance_id, about) {
   check_about(about)

@@ -57,7 +57,7 @@
 #'   * `$render(which = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: removes it from the server,
-#'   * `$is_open`: `TRUE`, and `FALSE` after `$close()`,
+#'   * `$is_open`: `TRUE`, and `FALSE` after `$close()` or if its server or its session has ended,
 #'   * `$action_space`, `$observation_space`: the spaces, as [env_action_space_info()],
 #'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
 #'     single environment the same,
@@ -105,8 +105,8 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
                      autoreset_mode = NULL, name = NULL, num_workers = NULL) {
   match_whole_names()
   make_unseeded(
-    env_id = env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode, num_envs = num_envs,
-    wrappers = wrappers, client = client, vectorization_mode = vectorization_mode,
+    env_id = env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode,
+    num_envs = num_envs, wrappers = wrappers, client = client, vectorization_mode = vectorization_mode,
     autoreset_mode = autoreset_mode, name = name, num_workers = num_workers,
     call = rlang::current_env()
   )
@@ -207,8 +207,12 @@ server_env <- R6Class(
     step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
       if (private$closed) check_open(self)
       if (missing(action)) check_given(action)
-      step_instance(
-        private$instance, action, which, named = TRUE, infos = infos, finals = finals
+      call <- rlang::current_env()
+      withCallingHandlers(
+        step_instance(
+          private$instance, action, which, named = TRUE, infos = infos, finals = finals
+        ),
+        gym_error_connection = function(cnd) check_open(self, call)
       )
     },
     render = function(which = 1) {
@@ -220,10 +224,8 @@ server_env <- R6Class(
       env_watch(self$client, self$instance_id)
     },
     close = function() {
-      if (!private$closed) {
-        close_if_there(self$client, self$instance_id)
-        private$closed <- TRUE
-      }
+      if (self$is_open) close_if_there(self$client, self$instance_id)
+      private$closed <- TRUE
       invisible(self)
     },
     print = function(...) {
@@ -236,12 +238,19 @@ server_env <- R6Class(
     client = function() private$instance$client,
     action_space = function() instance_space(private$instance, "action_space"),
     observation_space = function() instance_space(private$instance, "observation_space"),
-    is_open = function() !private$closed
+    is_open = function() {
+      if (!private$closed && is.null(private$ended)) {
+        private$ended <- end_of_instance(self$client, self$instance_id, private$pid)
+      }
+      !private$closed && is.null(private$ended)
+    }
   ),
   private = list(
     instance = NULL,
     pid = NULL,
     closed = FALSE,
+    # What has ended before it was closed, in words.
+    ended = NULL,
     finalize = function() {
       # In a forked child the environment still belongs to the parent.
       if (!private$closed && identical(private$pid, Sys.getpid())) {
@@ -294,12 +303,16 @@ format.gym_env <- function(x, ...) {
 }
 
 check_open <- function(env, call = rlang::caller_env()) {
-  if (!env$is_open) abort_closed(paste0("`gym_make(\"", env$spec$id, "\")` makes a new one."), call)
+  if (!env$is_open) {
+    hint <- paste0("`gym_make(\"", env$spec$id, "\")` makes a new one.")
+    abort_closed(hint, call, env$.__enclos_env__$private$ended)
+  }
 }
 
-abort_closed <- function(hint, call) {
+abort_closed <- function(hint, call, ended = NULL) {
+  problem <- if (is.null(ended)) "was closed" else paste("was made", ended)
   gym_abort(
-    c("This environment was closed.", i = hint),
+    c(paste0("This environment ", problem, "."), i = hint),
     class = "gym_error_argument", argument = "env", call = call
   )
 }

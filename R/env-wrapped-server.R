@@ -71,7 +71,11 @@ wrapped_server_env <- R6Class(
       invisible(self)
     }
   ),
-  active = list(is_open = function() private$env$is_open),
+  active = list(is_open = function() {
+    open <- private$env$is_open
+    private$ended <- private$env$.__enclos_env__$private$ended
+    open
+  }),
   private = list(
     env = NULL, traits = NULL, functions = NULL, info = NULL,
     # The actions as the wrapper's function gets them.

@@ -37,3 +37,31 @@ test_that("an environment that cannot be described is closed again", {
   expect_error(env_create(server, "Bad-v0"), "action_space", class = "gym_error_connection")
   expect_false(instance_place(server, "0a1b2c3d") %in% ls(the_session$instances))
 })
+
+test_that("an environment whose server has ended is not open, and says so", {
+  server <- local_server()
+  single <- gym_make("CartPole-v1", client = server)
+  several <- gym_make("CartPole-v1", client = server, num_envs = 2)
+  wrapped <- gym_wrap(gym_make("CartPole-v1", client = server), "TransformReward",
+                      func = function(reward) -reward)
+  classic <- env_create(server, "CartPole-v1")
+  file <- withr::local_tempfile()
+  saveRDS(single, file)
+  for (env in list(single, several, wrapped)) env$reset()
+  gym_server_stop(server)
+  # Before anything else has noticed it.
+  expect_error(single$step(1), "on a server that has ended", class = "gym_error_argument")
+  for (env in list(single, several, wrapped)) {
+    expect_false(env$is_open)
+    expect_error(env$reset(), "on a server that has ended", class = "gym_error_argument")
+    expect_silent(env$close())
+  }
+  expect_silent(env_close(server, classic))
+  script <- paste0(
+    "library(gym); env <- readRDS('", normalizePath(file, "/"), "');",
+    "say <- function(code) tryCatch(code, error = function(cnd) cat(conditionMessage(cnd)));",
+    "say(env$step(1)); say(env$reset()); cat(env$is_open, env$close()$is_open)"
+  )
+  said <- processx::run(file.path(R.home("bin"), "Rscript"), c("-e", script))$stdout
+  expect_match(said, "made in a session that has ended.*in a session that has ended.*FALSE FALSE")
+})
