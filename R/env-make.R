@@ -106,8 +106,8 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   match_whole_names()
   make_unseeded(
     env_id = env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode,
-    num_envs = num_envs, wrappers = wrappers, client = client, vectorization_mode = vectorization_mode,
-    autoreset_mode = autoreset_mode, name = name, num_workers = num_workers,
+    num_envs = num_envs, wrappers = wrappers, client = client,
+    vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name, num_workers = num_workers,
     call = rlang::current_env()
   )
 }
