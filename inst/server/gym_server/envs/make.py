@@ -141,13 +141,15 @@ def _explain(failure: error.Error, env_id: str, name: str) -> GymServerError:
             )
         case error.VersionNotFound():
             return GymServerError(
-                "unknown_env_id", f"There is no such version of '{env_id}'", _use_latest(name)
+                "unknown_env_id",
+                f"There is no such version of '{env_id}'",
+                _use_namespace(name) or _use_latest(name),
             )
         case _:
             return GymServerError(
                 "unknown_env_id",
                 f"There is no environment '{env_id}'",
-                _use_ale(name) or _did_you_mean(name),
+                _use_namespace(name) or _use_ale(name) or _did_you_mean(name),
             )
 
 
@@ -164,6 +166,12 @@ def _use_ale(name: str) -> str | None:
         return None
     env_id, shows_memory = game
     return f'use {env_id} with kwargs {{"obs_type": "ram"}}' if shows_memory else f"use {env_id}"
+
+
+def _use_namespace(name: str) -> str | None:
+    """Return the hint for an id whose namespace was left out, such as ``Breakout-v5``."""
+    ids = [env_id for env_id in gymnasium.registry if env_id.partition("/")[2] == name]
+    return f"use {' or '.join(ids)}" if ids else None
 
 
 def _use_latest(name: str) -> str:

@@ -243,3 +243,9 @@ def test_a_constructor_that_raises_is_the_environments_error():
     refused = refusal("faulty_envs:RaisesInConstructor-v0", allowed=["faulty_envs"])
     assert refused.code == "environment_error"
     assert refused.message == "The environment raised RuntimeError: no such table"
+
+
+def test_an_id_without_its_namespace_names_the_whole_id():
+    assert refusal("Acrobot-v77").hint == "use Acrobot-v1"
+    pytest.importorskip("ale_py")
+    assert refusal("Breakout-v5").hint == "use ALE/Breakout-v5"
