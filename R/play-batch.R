@@ -79,6 +79,9 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
 naming_call <- function(code, vector_env, changed = function() NULL) {
   withCallingHandlers(
     code,
+    error = function(cnd) {
+      if (!inherits(cnd, "gym_error") && is_about_one(cnd)) abort_about_one(cnd, vector_env)
+    },
     gym_error = function(cnd) {
       own_step <- is_own_step(cnd$call)
       # Errors about an observation name the argument that is to blame.

@@ -41,6 +41,21 @@ ask_about_one <- function(policy, one, vector_env) {
   )
 }
 
+# Was it raised by if () or && for several observations? They pass the test with a single one.
+is_about_one <- function(cnd) {
+  grepl("the condition has length > 1|in coercion to 'logical\\(1\\)'", conditionMessage(cnd))
+}
+
+abort_about_one <- function(cnd, vector_env) {
+  gym_abort(
+    c("The policy failed for several observations.",
+      i = observations_hint(vector_env$observation_space),
+      i = "`if ()` and `&&` take one; `ifelse()` and `&` work for each of many."),
+    class = c(own_classes(cnd), "gym_error_argument"), argument = "policy",
+    call = vector_env$call, parent = cnd
+  )
+}
+
 #' Convert the result of a function to a batch of actions
 #'
 #' Checks that there is one action for each sub-environment. The environment checks whether each is

@@ -188,10 +188,31 @@ policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()
     )
   }
   load_model_package(policy, call)
+  if (inherits(actions, "gym_space_discrete")) check_labels(policy, actions, env$spec$id, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- actions
   policy["env_id"] <- list(env$spec$id)
   policy
+}
+
+# The levels of a binomial model's factor must be actions: their numbers or their names.
+check_labels <- function(policy, space, env_id, call) {
+  numbers <- as.character(state_numbers(space))
+  strange <- setdiff(policy$labels, c(numbers, action_meaning(env_id, space$n)))
+  if (length(strange)) {
+    gym_abort(
+      c(paste0("The levels of the model's response, ", quoted_names(policy$labels),
+               ", must be actions; ", quoted_names(strange), if (length(strange) > 1L) {
+                 " are none."
+               } else {
+                 " is none."
+               }),
+        i = paste0("The actions are ", paste(action_names(env_id, space$n, space$start),
+                                             collapse = ", "), "."),
+        i = "`glm(factor(action) ~ ..., binomial)` is fitted to their numbers."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    )
+  }
 }
 
 # A policy that was read from a file does not load the package.
@@ -324,6 +345,10 @@ check_predictions <- function(policy, predicted, n, width, call) {
     hint <- if (right && discrete) {
       paste("If these are probabilities, name the type that gives the most probable action,",
             "such as `as_policy(model, type = \"class\")`")
+    } else if (is.list(predicted) && length(names(predicted))) {
+      paste0("It is a list of ", few_names(names(predicted)), ". Play a function that takes the ",
+             "actions from it, such as `function(observation) predict(model, ",
+             "as.data.frame(observation))$", names(predicted)[[1L]], "`")
     } else if (right) {
       paste0("An action of ", format(policy$action_space), " has ", count_of(width, "number"))
     }

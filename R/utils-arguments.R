@@ -268,6 +268,6 @@ describe_argument <- function(x) {
 
 # Can the value itself be shown? The class of an integer64 is its only attribute.
 is_short <- function(x) {
-  plain <- if (is_integer64(x)) unclass(x) else x
+  plain <- if (is_integer64(x)) unclass(x) else if (is.factor(x)) as.character(x) else x
   is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))
 }

@@ -56,6 +56,9 @@ abort_space <- function(space, value, problem, call, path = "") {
 }
 
 describe_value <- function(value) {
+  if (is.factor(value)) {
+    return(paste("the factor", describe_value(as.character(value))))
+  }
   if (is_integer64(value)) {
     # deparse() would show its bits as a double.
     return(paste("the integer64", describe_value(double_from_integer64(value))))

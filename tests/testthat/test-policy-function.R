@@ -163,3 +163,13 @@ test_that("the hint for a function of a single observation names a part that the
   expect_match(hint("MountainCar-v0", 2), "`observation[, \"velocity\"]`", fixed = TRUE)
   expect_match(hint("Other-v0", 4), "`observation[, 3]`", fixed = TRUE)
 })
+
+test_that("if () for many observations is told how to decide for each", {
+  skip_if(getRversion() < "4.2", "if () takes the first of several")
+  one <- function(observation) if (observation[, 3] > 0) 1 else 0
+  vector_env <- list(observation_space = box_space(rep(-9, 4), rep(9, 4)), call = quote(rollout()))
+  cnd <- expect_error(naming_call(one(matrix(0, 2, 4)), vector_env), "failed for several",
+                      class = "gym_error_argument")
+  expect_match(conditionMessage(cnd), "`ifelse()` and `&` work for each", fixed = TRUE)
+  expect_match(conditionMessage(cnd), "`observation[, 3]`", fixed = TRUE)
+})

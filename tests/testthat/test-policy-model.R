@@ -262,3 +262,18 @@ test_that("a model plays, predicts, prints and is mapped", {
     plot(map)
   })
 })
+
+test_that("levels that are no actions are refused before the first step, with the actions", {
+  steps <- made_up_steps()
+  steps$side <- factor(c("left", "right")[steps$action + 1L])
+  cnd <- expect_error(bound(glm(side ~ pole_angle, binomial, steps)),
+                      "`left`, `right`, must be actions; `left`, `right` are none",
+                      class = "gym_error_argument")
+  expect_match(conditionMessage(cnd), "0: push left, 1: push right", fixed = TRUE)
+})
+
+test_that("a prediction that is a list of several things names how to take the actions", {
+  told <- predicting(structure(list(predictions = c(0, 1), num.trees = 5), class = "told_answer"))
+  expect_error(act(bound(told), leaning[1:2, ]), "as.data.frame(observation))$predictions`",
+               fixed = TRUE, class = "gym_error_argument")
+})

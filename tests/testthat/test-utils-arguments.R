@@ -129,3 +129,8 @@ test_that("the name of an environment's argument is never completed to another's
   trained <- search_ars("Short-v0", p = 2, iterations = 1, seed = 1, progress = FALSE)
   expect_identical(trained$evaluation$mean_return, 2)
 })
+
+test_that("a factor is shown as its values", {
+  expect_identical(describe_argument(factor(c("b", "a"))), "the factor c(\"b\", \"a\")")
+  expect_identical(describe_value(factor("left")), "the factor \"left\"")
+})
