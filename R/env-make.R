@@ -107,7 +107,8 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
   make_unseeded(
     env_id = env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode,
     num_envs = num_envs, wrappers = wrappers, client = client,
-    vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name, num_workers = num_workers,
+    vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
+    num_workers = num_workers,
     call = rlang::current_env()
   )
 }

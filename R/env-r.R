@@ -43,8 +43,8 @@
 #'   `space_discrete(3)`.
 #' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
 #'   `self$size`. An environment of R or an object of R6 is refused, also in a list, because all
-#'   sub-environments would share it: make it in `reset`. In a vectorised environment `num_envs` is the number of sub-environments of this
-#'   object, 256 by default.
+#'   sub-environments would share it: make it in `reset`. In a vectorised environment `num_envs` is
+#'   the number of sub-environments of this object, 256 by default.
 #' @param render A function of `self` that draws the environment. It plots with R's graphics, or
 #'   returns a picture: a raster image, a matrix of greys or of colours, or an array of height x
 #'   width x 3. `NULL`, the default, for an environment that cannot be drawn.
