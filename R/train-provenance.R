@@ -10,9 +10,8 @@
 #' @return An object of class `gym_provenance`, which prints a line for each element. It is a list
 #'   of
 #'   * `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK`: strings,
-#'   * `server`: the versions of the server, and of what simulates the environment (mujoco, ale-py,
-#'     Box2D or jax), a named list of strings; `NULL` for an environment in
-#'   R,
+#'   * `server`: the versions of the server, and of what simulates the environment (such as MuJoCo,
+#'     Box2D or jax), a named list of strings; `NULL` for an environment in R,
 #'   * `processor`: a string; the server's processor if its processes play, because the last bits of
 #'   NumPy depend on it,
 #'   * `way`: `"beside the environment"` or `"step by step"`, see [rollout()]; for a learner, how it
