@@ -1,0 +1,114 @@
+# From a model's prediction to an action.
+
+model_actions <- function(policy, columns, call) {
+  check_was_played(policy, call)
+  space <- policy$action_space
+  n <- length(columns[[1L]])
+  predicted <- model_predictions(policy, columns, call)
+  discrete <- inherits(space, "gym_space_discrete")
+  if (discrete && inherits(policy$model, "nnet") && NCOL(predicted) == space$n && space$n > 1) {
+    predicted <- largest_output(policy, predicted, call)
+  }
+  # The columns of a model have names from the table of steps, or of its formula.
+  predicted <- action_by_name(space, predicted, NULL, call)
+  check_predictions(policy, predicted, n, if (discrete) 1L else prod(space$shape), call)
+  values <- if (is.factor(predicted)) as.character(predicted) else predicted
+  values <- matrix(values, n, NCOL(predicted))
+  actions <- if (discrete) chosen_actions(policy, values[, 1L]) else values
+  wrong <- if (discrete) is.na(actions) else !is.finite(actions)
+  if (any(wrong)) {
+    abort_no_action(policy, values[wrong][[1L]], call)
+  }
+  if (discrete) actions else shape_values(as.vector(t(actions)), c(n, space$shape))
+}
+
+# Checks that there is an action for each observation, with the right number of numbers.
+check_predictions <- function(policy, predicted, n, width, call) {
+  discrete <- inherits(policy$action_space, "gym_space_discrete")
+  right <- if (discrete) is.atomic(predicted) else is.numeric(predicted)
+  must <- "must give one action for each observation, not"
+  if (!right || NCOL(predicted) != width) {
+    hint <- if (right && discrete) {
+      paste("If these are probabilities, name the type that gives the most probable action,",
+            "such as `as_policy(model, type = \"class\")`")
+    } else if (is.list(predicted) && length(names(predicted))) {
+      paste0("It is a list of ", few_names(names(predicted)), ". Play a function that takes the ",
+             "actions from it, such as `function(observation) predict(model, ",
+             "as.data.frame(observation))$", names(predicted)[[1L]], "`")
+    } else if (right) {
+      paste0("An action of ", format(policy$action_space), " has ", count_of(width, "number"))
+    }
+    abort_prediction(policy, paste(must, describe_argument(predicted)), hint, call)
+  }
+  if (NROW(predicted) != n) {
+    hint <- paste("Fit the model by the columns' names, as in",
+                  "`lm(action ~ pole_angle, data = as.data.frame(played))`: a model of",
+                  "`data$action` predicts for the data that it was fitted to")
+    problem <- paste(must, NROW(predicted), "for", count_of(n, "observation"))
+    abort_prediction(policy, problem, hint, call)
+  }
+}
+
+# Several columns of nnet() are outputs to compare.
+largest_output <- function(policy, outputs, call) {
+  space <- policy$action_space
+  if (anyNA(outputs)) {
+    abort_no_action(policy, NA, call)
+  }
+  labels <- colnames(outputs) %||% (space$start + seq_len(space$n) - 1L)
+  labels[max.col(outputs, ties.method = "first")]
+}
+
+# Discrete actions from labels or the nearest numbers; NA for a label without an action.
+chosen_actions <- function(policy, values) {
+  space <- policy$action_space
+  if (!is.null(policy$labels) && is.numeric(values)) {
+    values <- policy$labels[1L + (values > 0.5)]
+  }
+  if (!is.character(values)) {
+    return(nearest_actions(space, as.numeric(values)))
+  }
+  # The actions' numbers, or their names in the documentation.
+  numbers <- as.integer(space$start + seq_len(space$n) - 1L)
+  found <- match(values, as.character(numbers))
+  found <- ifelse(is.na(found), match(values, action_meaning(policy$env_id, space$n)), found)
+  numbers[found]
+}
+
+# NA for a whole number that is not an action.
+nearest_actions <- function(space, numbers) {
+  last <- space$start + space$n - 1
+  whole <- numbers == trunc(numbers)
+  nearest <- pmin(pmax(ceiling(numbers - 0.5), space$start), last)
+  nearest[!is.finite(numbers) | whole & nearest != numbers] <- NA
+  as.integer(nearest)
+}
+
+abort_no_action <- function(policy, predicted, call) {
+  space <- policy$action_space
+  missing <- is.na(predicted) && !is.nan(predicted)
+  actions <- if (!inherits(space, "gym_space_discrete")) {
+    "The numbers of an action must be finite"
+  } else if (space$n <= 8L) {
+    names <- action_names(policy$env_id, space$n, space$start)
+    paste("The actions are", paste(names, collapse = ", "))
+  } else {
+    paste("The actions are from", space$start, "to", space$start + space$n - 1L)
+  }
+  abort_prediction(
+    policy,
+    paste0("gave ", if (missing) "NA" else describe_value(predicted), ", which is no action of ",
+           format(space)),
+    c(actions, if (missing) "Is a part of the observation missing in the data of the model?"), call
+  )
+}
+
+abort_prediction <- function(policy, problem, hints, call, parent = NULL) {
+  lines <- c(paste("The `predict()` of the", format(policy), problem), hints)
+  lines <- ifelse(grepl("[.?]$", lines), lines, paste0(lines, "."))
+  names(lines) <- c("", rep("i", length(hints)))
+  gym_abort(
+    lines,
+    class = "gym_error_argument", argument = "policy", value = policy, call = call, parent = parent
+  )
+}
