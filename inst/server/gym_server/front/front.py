@@ -86,7 +86,11 @@ class Front:
         self._listen()
         while self._servers or not self._is_stopping:
             for key, events in self._selector.select(_TICK_SECONDS):
-                key.data(events)
+                try:
+                    key.data(events)
+                except Exception:
+                    # It concerns one connection, and all users are here.
+                    log.exception("A connection failed because of a bug in the front")
             if time.monotonic() >= self._tick_at:
                 self._tick_at = time.monotonic() + _TICK_SECONDS
                 self._tick()

@@ -114,7 +114,8 @@ class Starts:
         if share // parts < _LEAST_MB:
             raise ShareError(
                 f"{share} MiB for each user are too little for {parts} processes of "
-                f"{_LEAST_MB} MiB; use a larger --max-memory-mb, or a smaller --max-processes"
+                f"{_LEAST_MB} MiB (one, where there are cgroups); use a larger --max-memory-mb, or "
+                "a smaller --max-processes"
             )
         return share
 

@@ -129,7 +129,13 @@ class UserServer:
             self.clients[client] = None
             self.end()
 
-        server = socket.socket()
+        try:
+            server = socket.socket()
+        except OSError as error:
+            log.warning("No more connections: %s", error.strerror)
+            client.socket.close()
+            ended()
+            return
         server.setblocking(False)
         server.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         server.connect_ex(("127.0.0.1", port))

@@ -282,6 +282,24 @@ def test_who_shows_no_token_in_time_is_closed(quick_front, sent):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="only Linux limits others")
+def test_a_front_that_may_open_no_more_files_serves_when_some_are_closed(quick_front):
+    assert quick_front.ask(BEN, "GET", "/v1/envs/")[0] == 200
+    pid = quick_front.process.pid
+    before = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+    few = len(os.listdir(f"/proc/{pid}/fd")) + 9
+    resource.prlimit(pid, resource.RLIMIT_NOFILE, (few, before[1]))
+    try:
+        with contextlib.ExitStack() as stack:
+            for _ in range(15):
+                stack.enter_context(quick_front.socket()).sendall(asked(BEN))
+            # Who waits is served when those before have left.
+        assert quick_front.ask(BEN, "GET", "/v1/envs/")[0] == 200
+    finally:
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, before)
+
+
+@pytest.mark.slow
 def test_a_server_that_nobody_uses_ends_and_starts_anew(quick_front, eventually):
     url = quick_front.make("anna")
     pid = quick_front.pid_of("anna")
