@@ -40,7 +40,7 @@ is_running <- function(base) {
 #'   0 for no limit). `idle_minutes` is the time after which an unused environment is removed
 #'   (1,440; 0 for never).
 #'   * `vignette("server", package = "gym")` describes the options of a server for a group:
-#'   `isolate`, `max_worker_mb`, `allow_host`, `allow_path`, `no_auth`, `no_shutdown`.
+#'   `allow_host`, `allow_path`, `no_auth`, `no_shutdown`.
 #' @param timeout The time for the start, in seconds. The default is 60.
 #' @param token Should the server require its own token? `TRUE` or `FALSE`. It makes the token at
 #'   its start and gives it to this session only, so other accounts of the machine cannot use the

@@ -7,7 +7,7 @@
 
 A part is a command that prints a line "PART: figures" (or several, such as "PART-json: ...") and
 fails by its exit status. GYM_SOAK_SERVER has options for the servers of clients, soak and idle,
-such as "--isolate all".
+such as "--max-processes 4".
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ test_that("an environment that nobody uses is closed, which its calls say, and c
 
 test_that("a call that takes too long fails in time, and the others go on", {
   skip_unless_all()
-  server <- local_odd_server(max_call_seconds = 1, isolate = "none")
+  server <- local_odd_server(max_call_seconds = 1)
   other <- gym_make("CartPole-v1", client = server)
   many <- gym_make("CartPole-v1", num_envs = 1e6, client = server) |>
     expect_error(class = "gym_error_http_429")

@@ -89,9 +89,9 @@ draw_scale <- function(heights, labels, values) {
 
 # How the contenders for a step are drawn, by their names in wire_names.
 step_styles <- data.frame(
-  name = c("bare", "parsed", "gym", "isolated"),
-  label = c("the same bytes", "and parsed", "env$step()", "env$step(), isolated"),
-  colour = c("black", "grey50", gym_colour, "#CC79A7")
+  name = c("bare", "parsed", "gym"),
+  label = c("the same bytes", "and parsed", "env$step()"),
+  colour = c("black", "grey50", gym_colour)
 )
 
 draw_steps <- function(rows) {

@@ -166,9 +166,7 @@ wire_goals <- function(rows) {
     }),
     list(
       goal("a bare handle, 32 sub-environments: at most 1.4 times a single environment",
-           step_ratio(rows, "bare", 32, "bare", 0), at_most = 1.4),
-      goal("env$step() isolated: at most 1.5 times in the server's process",
-           step_ratio(rows, "isolated", 0, "gym"), at_most = 1.5)
+           step_ratio(rows, "bare", 32, "bare", 0), at_most = 1.4)
     )
   )
 }

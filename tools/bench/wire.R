@@ -2,21 +2,18 @@
 # same bytes and knows nothing of environments: what R's own calls add.
 
 wire_names <- c(
-  gym = "gym, env$step()", parsed = "bare handle, parsed and checked", bare = "bare handle",
-  isolated = "gym, env$step(), isolated"
+  gym = "gym, env$step()", parsed = "bare handle, parsed and checked", bare = "bare handle"
 )
 
 compare_steps <- function(python, turns, steps) {
   client <- gym_server_start(python = python, token = FALSE)
-  isolated <- gym_server_start(python = python, token = FALSE, isolate = "all")
   recorder <- start_recorder(python, client)
   on.exit({
     end_worker(recorder)
     gym_server_stop(client)
-    gym_server_stop(isolated)
   })
   contenders <- c(
-    single_step_contenders(client, isolated, recorder),
+    single_step_contenders(client, recorder),
     unlist(lapply(c(32L, 1024L, 8192L), function(num_envs) {
       vector_step_contenders(client, recorder, num_envs)
     }), recursive = FALSE)
@@ -31,14 +28,11 @@ compare_steps <- function(python, turns, steps) {
   }))
 }
 
-single_step_contenders <- function(client, isolated, recorder) {
+single_step_contenders <- function(client, recorder) {
   env <- gym_make("CartPole-v1", seed = 1, client = client)
-  apart <- gym_make("CartPole-v1", seed = 1, client = isolated)
   bare <- bare_step(client, recorder, NULL)
-  called <- "env$step(a)"
   list(
-    step_contender(0, "gym", called, play_env_steps(env, 1L)),
-    step_contender(0, "isolated", called, play_env_steps(apart, 1L)),
+    step_contender(0, "gym", "env$step(a)", play_env_steps(env, 1L)),
     step_contender(0, "parsed", "curl_fetch_memory(), parse_json()", function(steps) {
       play_bare_steps(bare, steps, read_step)
     }),

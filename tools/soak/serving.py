@@ -25,7 +25,7 @@ class ServerProcess:
             [
                 *(sys.executable, "-m", "gym_server", "--port", "0", "--stop-on-stdin-eof"),
                 *("--allow-module", "faulty_envs", *arguments),
-                # For another kind of soak test: GYM_SOAK_SERVER="--isolate all".
+                # For another kind of soak test: GYM_SOAK_SERVER="--max-processes 4".
                 *shlex.split(os.environ.get("GYM_SOAK_SERVER", "")),
             ],
             stdin=subprocess.PIPE,

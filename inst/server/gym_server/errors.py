@@ -194,12 +194,12 @@ def environment_error(error: BaseException, who: str = "The environment") -> Gym
     return GymServerError("environment_error", f"{who} raised {last_line}")
 
 
-def environment_died(how: str, doing: str, hint: str | None = None) -> GymServerError:
-    """Report that the process of an isolated environment ended unexpectedly."""
+def environment_died(how: str, doing: str) -> GymServerError:
+    """Report that a process of an environment ended unexpectedly."""
     return GymServerError(
         "environment_died",
         f"The environment's process ended {doing}: {how}",
-        hint or "it is closed, and the others continue; create another",
+        "it is closed, and the others continue; create another",
     )
 
 

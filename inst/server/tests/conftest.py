@@ -27,10 +27,7 @@ def monitor_dir(tmp_path):
 
 @pytest.fixture
 def app(monitor_dir):
-    # In this process, so that tests can look inside; test_isolated_instance.py tests processes.
-    app = create_app(
-        Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"], isolate="none")
-    )
+    app = create_app(Config(monitor_dir=monitor_dir, allowed_modules=["faulty_envs"]))
     yield app
     app.close()
 
@@ -40,12 +37,8 @@ def quick():
     """Return a function that makes an application with its own limits."""
     apps = []
 
-    def quick(isolate="none", **limits):
-        apps.append(
-            create_app(
-                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate=isolate)
-            )
-        )
+    def quick(**limits):
+        apps.append(create_app(Config(allowed_modules=["faulty_envs"], limits=Limits(**limits))))
         return apps[-1]
 
     yield quick

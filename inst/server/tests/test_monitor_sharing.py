@@ -159,9 +159,8 @@ def record(server, url, directory="agents", **fields):
     return server.get(f"{url}/")[1]["monitor"]["directory"]
 
 
-@pytest.mark.parametrize("mode", ["none", "all"])
-def test_six_agents_that_name_one_directory_all_record(serve, tmp_path, mode):
-    options = ("--isolate", mode, "--monitor-dir", str(tmp_path))
+def test_six_agents_that_name_one_directory_all_record(serve, tmp_path):
+    options = ("--monitor-dir", str(tmp_path))
     server = serve(*options)
     urls = [server.create("CartPole-v1") for _ in range(6)]
     directories = [record(server, url, force=True) for url in urls]

@@ -10,9 +10,9 @@ pytestmark = pytest.mark.slow
 KINDS = {"interrupts": "KeyboardInterrupt", "leaves": "SystemExit", "ends_a_generator": "Generator"}
 
 
-@pytest.fixture(scope="module", params=["none", "all"])
-def server(request):
-    options = {"--port": "0", "--allow-module": "faulty_envs", "--isolate": request.param}
+@pytest.fixture(scope="module")
+def server():
+    options = {"--port": "0", "--allow-module": "faulty_envs"}
     # Nobody reads its log, which would fill the pipe.
     process = ServerProcess(*sum(options.items(), ()), "--log-level", "error")
     yield process
@@ -70,7 +70,7 @@ def test_drawing_that_ends_its_process_is_an_answer(server, does):
 
 
 def test_an_operators_ctrl_c_still_stops_the_server(serve):
-    server = serve("--isolate", "none")
+    server = serve()
     url = server.create("faulty_envs:Rogue-v0", kwargs={"does": "interrupts", "at": "step"})
     server.post(f"{url}/reset/")
     assert server.post(f"{url}/step/", {"action": 0})[0] == 500

@@ -290,7 +290,7 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, eventua
 
 
 def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, eventually):
-    strict = serve("--max-call-seconds", "1", "--isolate", "none")
+    strict = serve("--max-call-seconds", "1")
     where = {"where": "reset"}
     url = strict.create("faulty_envs:HangsWhere-v0", kwargs=where, render_mode="rgb_array")
     browser.get(f"http://127.0.0.1:{strict.port}{url}/watch/")

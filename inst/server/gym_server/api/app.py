@@ -22,7 +22,6 @@ from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.errors import GymServerError, body_too_large, busy_receiving, malformed_request
-from gym_server.isolation.policy import Isolation
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits, Watchers
 from gym_server.manager.rollouts import Rollouts
@@ -44,9 +43,6 @@ class Config:
         allowed_modules: the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
         limits: the limits for all clients together.
-        isolate: which environments get their own process: "none", "foreign" (those of modules other
-            than Gymnasium's and ale_py's, and those that may take much memory) or "all".
-        max_worker_mb: the memory limit of such a process in MiB; 0 for no limit.
         stop: asks the server to stop after answering the requests in progress.
         access: which requests the server accepts.
         client_stop: whether clients may stop it.
@@ -59,8 +55,6 @@ class Config:
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
     limits: Limits = field(default_factory=Limits)
-    isolate: str = "foreign"
-    max_worker_mb: int = 0
     stop: Callable[[], None] = lambda: None
     access: Access = field(default_factory=Access)
     client_stop: bool = True
@@ -89,7 +83,6 @@ class GymApp(Flask):
             config.allowed_modules,
             self._renderer,
             config.limits,
-            Isolation(config.isolate, config.max_worker_mb),
             AllowedPaths(config.allowed_paths),
         )
         watch_keys = WatchKeys(prefix=config.watch_prefix)

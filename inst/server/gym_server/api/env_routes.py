@@ -6,7 +6,7 @@ from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
-from gym_server.protocol.answers import Ready, tensor_response
+from gym_server.protocol.answers import tensor_response
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.known_headers import loads_tensors
 from gym_server.rendering.png import png
@@ -65,7 +65,7 @@ def env_about(call: Call) -> dict:
     once=True,
     tensors=True,
 )
-def env_reset(call: Call) -> dict | Ready:
+def env_reset(call: Call) -> dict:
     """Start an episode."""
     fields = call.fields
     if isinstance(fields["seed"], tuple):
@@ -87,7 +87,7 @@ def env_reset(call: Call) -> dict | Ready:
     tensors=True,
     tensor_body=loads_tensors,
 )
-def env_step(call: Call) -> dict | Ready:
+def env_step(call: Call) -> dict:
     """Take one step."""
     fields = call.fields
     return call.instance.step(
@@ -112,7 +112,7 @@ def env_render(call: Call) -> Response:
 
 
 @bp.declare("GET", INSTANCE + "model/", grows=True)
-def env_model(call: Call) -> dict | Ready:
+def env_model(call: Call) -> dict:
     """Return the transition model of an environment that has one."""
     return call.instance.transition_model()
 

@@ -55,7 +55,7 @@ def rollouts(call: Call) -> dict | Response:
         env_id=given["env_id"], kwargs=given["kwargs"], wrappers=given["wrappers"] or ()
     )
     tensors: Mapping[str, Tensor] = call.body.get("tensors") or {}
-    task, is_trusted = call.services.instances.rollout_task(
+    task = call.services.instances.rollout_task(
         config,
         policy=given["policy"] or {},
         tensors=_policy_tensors(tensors),
@@ -63,11 +63,11 @@ def rollouts(call: Call) -> dict | Response:
         keep=given["keep"] or Keep(),
     )
     if "seed" not in tensors:
-        return call.services.rollouts.describe(task, is_trusted)
+        return call.services.rollouts.describe(task)
     if given["policy"] is None:
         raise GymServerError("missing_parameter", "Episodes need the parameter 'policy'")
     units = _units(tensors)
-    played, error = call.services.rollouts.play(task, units, is_trusted, call.is_connected)
+    played, error = call.services.rollouts.play(task, units, call.is_connected)
     metadata = {}
     if error is not None:
         status, body = answer_to(error)

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from flask import Blueprint, Flask
 from werkzeug.exceptions import HTTPException
 
-from gym_server.protocol.answers import Ready
 from gym_server.protocol.fields import Field
 from gym_server.response import JSON, Response
 
@@ -19,7 +18,7 @@ INSTANCE = "/v1/envs/<instance_id>/"
 # The characters of an instance_id.
 _HEX_DIGITS = frozenset("0123456789abcdef")
 
-Handler = Callable[..., dict | Response | Ready | None]
+Handler = Callable[..., dict | Response | None]
 
 # How many routes of recent requests are remembered, and the longest path.
 _MOST_KNOWN = 4096

@@ -23,6 +23,7 @@ from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.own_log import keep_short
 from gym_server.cli.port_holder import port_holder
+from gym_server.cli.stuck import end_when_stuck
 from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token, new_token
 from gym_server.cli.users import BadUsersError, make_front
 from gym_server.http_server.server import Server, bind
@@ -87,8 +88,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             allowed_modules=options.allow_module,
             max_body_bytes=max_body_bytes,
             limits=Limits(**{one.name: getattr(options, one.name) for one in fields(Limits)}),
-            isolate=options.isolate,
-            max_worker_mb=options.max_worker_mb,
             stop=stop,
             access=Access(token, options.host, options.allow_host),
             client_stop=not options.no_shutdown,
@@ -130,6 +129,7 @@ def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> 
         threading.Thread(target=_wait_for_eof, args=(stop, options.own_log), daemon=True).start()
     if options.own_log is not None:
         threading.Thread(target=keep_short, args=(options.own_log,), daemon=True).start()
+    end_when_stuck(options.max_call_seconds)
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{port}", flush=True)
     # Redirect standard output to standard error: output of environments must not fill a pipe that

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from gym_server import __version__
 from gym_server.api.access import split_host
 from gym_server.cli.token_file import VARIABLE
-from gym_server.isolation.policy import MODES
 from gym_server.manager.limits import Limits
 
 
@@ -59,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
         help="a module that an env_id such as NAME:Id-v0 may import; may be repeated",
     )
     _add_limits(options)
-    _add_isolation(options)
+    _add_ended(options)
     _add_access(options)
     options.add_argument("--version", action="version", version=__version__)
     return options
@@ -94,8 +92,7 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
     add(
         "max_processes",
         _number(1, 100_000),
-        "processes of all environments: those that run sub-environments, and those of isolated "
-        "environments (%(default)s)",
+        "processes that run sub-environments, of all environments (%(default)s)",
     )
     add(
         "max_rollout_processes",
@@ -136,29 +133,26 @@ def _duration(text: str) -> float:
     raise argparse.ArgumentTypeError(f"{text!r} is not a number of at least 0")
 
 
-def _add_isolation(options: argparse.ArgumentParser) -> None:
-    options.add_argument(
-        "--isolate",
-        default="foreign",
-        choices=MODES,
-        help="which environments get their own process, so that a crash affects no other: those "
-        "of modules other than Gymnasium's, and on Linux those that may suddenly take much memory "
-        "(foreign), none or all (%(default)s)",
-    )
-    options.add_argument(
-        "--max-worker-mb",
-        type=_worker_mb,
-        default=0,
-        help="memory limit of such a process, on Linux; 0 for what is left of --max-memory-mb "
-        "(%(default)s)",
-    )
+# Options of earlier versions, and what to do instead.
+_ENDED = {
+    "--isolate": "the server serves one user, and environments play in its own process; for a "
+    "class, --users FILE starts a server for each user",
+    "--max-worker-mb": "--max-memory-mb limits the server",
+}
 
 
-def _worker_mb(text: str) -> int:
-    size = _number(0, 2**24)(text)
-    if size and sys.platform != "linux":
-        raise argparse.ArgumentTypeError("only Linux supports such a limit")
-    return size
+class _RefuseEnded(argparse.Action):
+    """Refuses an option that earlier versions had, and says what replaces it."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, _: object, __: object, option: str | None = None
+    ) -> None:
+        parser.error(f"{option} is gone: {_ENDED[str(option)]}")
+
+
+def _add_ended(options: argparse.ArgumentParser) -> None:
+    for option in _ENDED:
+        options.add_argument(option, nargs="?", action=_RefuseEnded, help=argparse.SUPPRESS)
 
 
 def _host_name(text: str) -> str:

@@ -26,7 +26,7 @@ from gym_server.envs.extras import (
 )
 from gym_server.envs.memory_estimate import environment_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.envs.registry import LONGEST_ID, importing, look_up, near
+from gym_server.envs.registry import LONGEST_ID, import_allowed, importing, look_up, near
 from gym_server.envs.tuple_arguments import parameters_of, with_tuples
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.json_values import brief, parse_nonfinite
@@ -107,6 +107,9 @@ def find_spec(env_id: object, allowed_modules: Collection[str]) -> registration.
         with importing:
             if module:
                 call_env(importlib.import_module, module)
+            elif allowed_modules and name not in gymnasium.registry:
+                # One of these may register it.
+                import_allowed(allowed_modules)
             spec = look_up(name)
     except error.Error as failure:
         raise _explain(failure, env_id, name) from failure

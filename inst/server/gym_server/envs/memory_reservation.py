@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from gym_server.budget import Budget
 from gym_server.errors import GymServerError
 
 _MB = 2**20
-
-
-class TooLargeHereError(GymServerError):
-    """The environment is too large for this process and must be made in another one."""
 
 
 class MemoryReservation:
@@ -21,19 +15,15 @@ class MemoryReservation:
         taken: the bytes taken so far.
     """
 
-    def __init__(
-        self, budget: Budget | None = None, num_envs: int = 1, most_here: float = math.inf
-    ) -> None:
+    def __init__(self, budget: Budget | None = None, num_envs: int = 1) -> None:
         """Start with nothing taken.
 
         Args:
             budget: the budget; None for no limit.
             num_envs: how many sub-environments ``reserve()`` reserves for.
-            most_here: the most bytes that one of them may take in this process.
         """
         self._budget = budget or Budget()
         self._num_envs = num_envs
-        self._most_here = most_here
         self.taken = 0.0
 
     def reserve(self, size: float, what: str, later: float = 0.0) -> None:
@@ -46,11 +36,8 @@ class MemoryReservation:
 
         Raises:
             GymServerError: ``too_much_memory``.
-            TooLargeHereError: there is enough memory, but not in this process.
         """
         self.take((size + later) * self._num_envs, what)
-        if self.taken > self._most_here * self._num_envs:
-            raise TooLargeHereError("too_much_memory", f"{what} is too large for this process")
         self.taken -= later * self._num_envs
         self._budget.give_back(later * self._num_envs)
 

@@ -131,12 +131,17 @@ def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:
         raise invalid_parameter("search", text, f"of at most {LONGEST_ID} characters")
     with importing:
         _register_packages()
-        for module in allowed_modules:
-            try:
-                importlib.import_module(module)
-            except BaseException as failure:
-                log.warning("The allowed module %s cannot be imported: %s", module, failure)
+        import_allowed(allowed_modules)
         return [_entry(spec) for spec in _matching(text)]
+
+
+def import_allowed(modules: Collection[str]) -> None:
+    """Import modules for what they register; the caller holds ``importing``."""
+    for module in modules:
+        try:
+            importlib.import_module(module)
+        except BaseException as failure:
+            log.warning("The allowed module %s cannot be imported: %s", module, failure)
 
 
 def _matching(text: str | None) -> Iterable[EnvSpec]:

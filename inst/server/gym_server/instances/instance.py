@@ -1,4 +1,4 @@
-"""One environment on the server: the common part, whatever process runs it."""
+"""One environment on the server: its lock, its watchers and its monitor."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.monitoring.recording import Recording
-from gym_server.protocol.answers import JSON_FORM, AnswerForm, Ready
+from gym_server.protocol.answers import JSON_FORM, AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.lock import InstanceLock
 from gym_server.viewing.viewer import Viewer
@@ -27,8 +27,8 @@ Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 class Instance(Watchable):
     """An environment that a client created.
 
-    ``LocalInstance`` plays it in this process, ``IsolatedInstance`` in a process of its own. They
-    implement the methods that start with an underscore, which are called with the lock held.
+    ``LocalInstance`` implements the methods that start with an underscore, which are called with
+    the lock held.
 
     Every method that resets, steps or draws the environment waits for its lock. If the instance is
     closed meanwhile, the method raises ``unknown_instance``, or why it was closed.
@@ -39,11 +39,9 @@ class Instance(Watchable):
         config: what its client chose.
         viewer: shows it to watchers.
         steps: the number of steps of its sub-environments.
-        can_be_killed: whether ``kill()`` ends every call on it, so that none can be stuck.
     """
 
     env_id: str
-    can_be_killed: bool
 
     def __init__(self, config: EnvConfig, renderer: RenderThread) -> None:
         """Prepare the lock and the viewer.
@@ -73,7 +71,7 @@ class Instance(Watchable):
         options: dict | None,
         form: AnswerForm = JSON_FORM,
         mask: np.ndarray | None = None,
-    ) -> dict | Ready:
+    ) -> dict:
         """Start an episode in every sub-environment, or in those of a mask.
 
         Args:
@@ -86,8 +84,7 @@ class Instance(Watchable):
 
         Returns:
             ``{"observation", "info"}`` as JSON values. The observation is ``Parts`` if tensors are
-            wanted and its space supports them; with sub-environments it is a batch. The process of
-            an isolated environment returns ``Ready``.
+            wanted and its space supports them; with sub-environments it is a batch.
 
         Raises:
             GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
@@ -109,7 +106,7 @@ class Instance(Watchable):
         form: AnswerForm = JSON_FORM,
         mask: np.ndarray | None = None,
         in_real_time: bool = False,
-    ) -> dict | Ready:
+    ) -> dict:
         """Take one step in every sub-environment, or in those of a mask.
 
         Args:
@@ -163,12 +160,11 @@ class Instance(Watchable):
             last = f"an integer from 0 to {num_envs - 1}" if num_envs > 1 else "0"
             raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
 
-    def transition_model(self) -> dict | Ready:
+    def transition_model(self) -> dict:
         """Return the transition model of an environment that has one.
 
         Returns:
-            ``{"model"}``, see ``envs.transition_model``; ``Ready`` from the process of an isolated
-            environment.
+            ``{"model"}``, see ``envs.transition_model``.
 
         Raises:
             GymServerError: ``not_supported``; ``environment_error``.
@@ -218,23 +214,7 @@ class Instance(Watchable):
 
     def about(self) -> dict:
         """Return everything known about the instance, without waiting for its environment."""
-        about = self._about()
-        entry = self.list_entry()
-        # The process of an isolated environment sends an entry of its own, which lacks the id and
-        # the watchers. So put the entry last, and also first, to keep it at the start of the
-        # response.
-        return {**entry, **about, **entry}
-
-    @property
-    def busy_since(self) -> float | None:
-        """When the current call on the environment started, in the clock's seconds, or None."""
-        since = (self.lock.busy_since, self.query_since)
-        return min((one for one in since if one is not None), default=None)
-
-    @property
-    def query_since(self) -> float | None:
-        """When the current call without the lock started, in the clock's seconds, or None."""
-        return None
+        return {**self.list_entry(), **self._about()}
 
     @property
     def grown(self) -> int:
@@ -322,10 +302,6 @@ class Instance(Watchable):
         Returns:
             The thread that is stuck in the environment and cannot answer its client, or None.
         """
-        if self.can_be_killed:
-            self.kill(why)
-            self.viewer.end(why)
-            return None
         stuck = self.lock.abandon(why)
         self.viewer.end(why)
         self.kill(why)
@@ -351,10 +327,10 @@ class Instance(Watchable):
 
     def _reset(
         self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
-    ) -> dict | Ready:
+    ) -> dict:
         raise NotImplementedError
 
-    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict | Ready:
+    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
         raise NotImplementedError
 
     def _sample_action(self) -> object:
@@ -363,7 +339,7 @@ class Instance(Watchable):
     def _render(self, sub_env: int) -> np.ndarray:
         raise NotImplementedError
 
-    def _transition_model(self) -> dict | Ready:
+    def _transition_model(self) -> dict:
         raise NotImplementedError
 
     def _close_monitor(self) -> None:

@@ -52,8 +52,6 @@ class LocalInstance(Instance):
         autoreset_mode: when a sub-environment whose episode ended is reset; None as above.
     """
 
-    # Threads cannot be killed.
-    can_be_killed = False
     single_action_space: Space
     single_observation_space: Space
     drawing: Drawing
@@ -244,7 +242,6 @@ class LocalInstance(Instance):
             "episode_steps": None,
             "needs_reset": self.has_ended or not self._was_reset,
             "monitor": None,
-            "isolated": False,
         }
 
     @property

@@ -15,7 +15,7 @@ from gym_server.budget import Budget
 from gym_server.envs import registry, wrappers
 from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.memory_reservation import MemoryReservation, TooLargeHereError
+from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import (
     GymServerError,
     call_too_long,
@@ -26,8 +26,6 @@ from gym_server.errors import (
 )
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
-from gym_server.isolation.isolated_instance import IsolatedInstance
-from gym_server.isolation.policy import Isolation
 from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
 from gym_server.manager.rollouts import Rollouts
@@ -37,7 +35,7 @@ from gym_server.processes.pool import pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.rollouts.task import Task
 from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt, interrupted_by
+from gym_server.threads.interrupt import interrupt
 from gym_server.vector_envs import make_vec
 from gym_server.vector_envs.num_workers import most_workers
 
@@ -61,14 +59,11 @@ class _Creation:
     Attributes:
         config: what its client chose.
         taken: its share of the server's limits.
-        kill: kills the process that the creating thread waits for, so that this thread can answer;
-            None if there is no such process.
         began: when it started, in the clock's seconds.
     """
 
     config: EnvConfig
     taken: _Taken
-    kill: Callable[[GymServerError], None] | None = None
     began: float = field(default_factory=time.monotonic)
 
     def too_long(self, seconds: float) -> GymServerError:
@@ -85,7 +80,6 @@ class InstanceManager:
         allowed_modules: Collection[str],
         renderer: RenderThread,
         limits: Limits | None = None,
-        isolation: Isolation | None = None,
         allowed_paths: AllowedPaths | None = None,
     ) -> None:
         """Start with no instances.
@@ -94,11 +88,9 @@ class InstanceManager:
             allowed_modules: the modules that an env_id may import.
             renderer: the process's render thread.
             limits: how many instances there may be, and how large.
-            isolation: which of them get their own process; None for none.
             allowed_paths: the files that clients may name; None for any.
         """
         self._limits = limits or Limits()
-        self._isolation = isolation or Isolation()
         self._allowed_paths = allowed_paths or AllowedPaths()
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
@@ -132,18 +124,8 @@ class InstanceManager:
         wrappers.check(config.wrappers)
         if config.num_envs is None:
             make_vec.check_single(config)
-        isolated = self._isolation.wants(
-            config.env_id, self._allowed_modules, config.vectorization_mode
-        )
-        try:
-            return self._create(config, isolated)
-        except TooLargeHereError:
-            return self._create(config, isolated=True)
-
-    def _create(self, config: EnvConfig, isolated: bool) -> Instance:
-        make_it = self._make_isolated if isolated else self._make
-        with self._room_for(config, isolated) as creation, contextlib.ExitStack() as undo:
-            instance = make_it(creation.config, creation, undo)
+        with self._room_for(config) as creation, contextlib.ExitStack() as undo:
+            instance = self._make(creation, undo)
             if not self._enlist(instance, creation):
                 undo.close()
                 raise creation.too_long(self._limits.max_call_seconds)
@@ -165,19 +147,15 @@ class InstanceManager:
             return True
 
     @contextlib.contextmanager
-    def _room_for(self, config: EnvConfig, isolated: bool) -> Iterator[_Creation]:
+    def _room_for(self, config: EnvConfig) -> Iterator[_Creation]:
         """Reserve room for an environment while it is created."""
-        # An isolated environment has a process already.
-        workers = most_workers(config) if config.wants_workers or not isolated else 0
-        most_here = self._isolation.most_bytes_here
-        reservation = MemoryReservation(self._budget, config.num_envs or 1, most_here)
+        workers = most_workers(config)
+        reservation = MemoryReservation(self._budget, config.num_envs or 1)
         with self._lock:
             taken = sum((one.room for one in list(self._taken.values())), Room(0))
             if not config.wants_workers:
                 workers = min(workers, max(0, self._limits.max_processes - taken.processes))
-            # An isolated environment starts its workers with its own fork server.
-            fork_server = bool(isolated and workers)
-            room = Room(config.num_envs or 1, isolated + fork_server + workers)
+            room = Room(config.num_envs or 1, workers)
             creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
             instances = len(self._instances) + len(self._creating)
             self._limits.check_room(instances, taken, room)
@@ -200,46 +178,27 @@ class InstanceManager:
             taken.reservation.give_back()
             self.left_garbage = True
 
-    def _make(self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
+    def _make(self, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
         taken = creation.taken
         instance = make_instance(
-            config,
+            creation.config,
             self._allowed_modules,
             self._limits.max_num_envs,
             self._renderer,
             undo,
             taken.reservation,
         )
-        # Release the room for processes that were not needed. Not for an isolated environment: its
-        # untrusted process would report the number.
+        # Release the room for processes that were not needed.
         with self._lock:
             taken.room = replace(taken.room, processes=instance.num_workers or 0)
         return instance
 
-    def _make_isolated(
-        self, config: EnvConfig, creation: _Creation, undo: contextlib.ExitStack
-    ) -> Instance:
-        settings = self._isolation.settings(
-            config.env_id, self._allowed_modules, self._limits.max_num_envs, self._budget.left
-        )
-        # Do not interrupt before the process has started; see ``SubEnvs``.
-        with interrupted_by(lambda: None):
-            instance = IsolatedInstance(config, settings, self._renderer)
-            undo.callback(instance.kill, shutting_down())
-            creation.kill = instance.kill
-        instance.create(creation.taken.reservation)
-        return instance
-
     def registered(self, search: str | None) -> list[dict]:
         """Return the environments that can be created; see ``registry.search()``."""
-        if self._isolation.mode != "none" and self._allowed_modules:
-            return self._isolation.search(
-                search, self._allowed_modules, self._limits.max_call_seconds
-            )
         return registry.search(search, self._allowed_modules)
 
-    def rollout_task(self, config: EnvConfig, **what: Any) -> tuple[Task, bool]:
-        """Return the task of a rollout, and whether its environment is trusted.
+    def rollout_task(self, config: EnvConfig, **what: Any) -> Task:
+        """Return the task of a rollout.
 
         Args:
             config: the environment.
@@ -250,8 +209,7 @@ class InstanceManager:
         """
         self._allowed_paths.check(config)
         wrappers.check(config.wrappers)
-        is_trusted = not self._isolation.wants(config.env_id, self._allowed_modules)
-        return Task(config, self._allowed_modules, self._budget.limit, **what), is_trusted
+        return Task(config, self._allowed_modules, self._budget.limit, **what)
 
     def get(self, instance_id: str) -> Instance:
         """Return an instance.
@@ -345,15 +303,13 @@ class InstanceManager:
             if began < before and self._creating.abandon(creation):
                 why = creation.too_long(seconds)
                 log.warning("%s", why.message)
-                if creation.kill is not None:
-                    creation.kill(why)
-                elif not self._renderer.abandon(thread, why):
+                if not self._renderer.abandon(thread, why):
                     answer(thread, why)
                 self._creating.answered(creation)
         with self._lock:
             instances = [*self._instances.values(), *self._closing.values()]
         for instance in instances:
-            since = instance.busy_since
+            since = instance.lock.busy_since
             if since is not None and since < before:
                 what = f"A call on instance {instance.instance_id} of {instance.env_id}"
                 why = call_too_long(what, seconds, "the instance is gone")

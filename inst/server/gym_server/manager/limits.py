@@ -39,8 +39,8 @@ class Limits:
             environment counts as one; None for four times max_num_envs.
         max_processes: the number of processes of all environments. Regardless of the number of
             cores, each takes 7 MB when it is created and 20 MB in use, two threads and 15 files,
-            even when idle. The default suits a class in which everybody has some isolated
-            environments, or sub-environments in processes.
+            even when idle. The default suits a class in which everybody has sub-environments
+            in processes.
         max_rollout_processes: the number of processes that play whole episodes, besides these; None
             for one per core, but none if max_processes is 0.
         max_memory_mb: the memory of all environments in MiB, estimated in advance

@@ -26,7 +26,6 @@ class RolloutRequest:
         number: identifies its task to processes.
         task: what all units have in common.
         function: the function to call in the process: "play" or "describe".
-        key: which processes may play it; see ``_Player``.
         units: all units.
         waiting: the ranges of units that are not being played, in order.
         playing: how many ranges are being played.
@@ -43,7 +42,6 @@ class RolloutRequest:
     number: int
     task: Task
     function: str
-    key: str | None
     units: Sequence[Unit]
     waiting: deque[range] = field(default_factory=deque)
     playing: int = 0

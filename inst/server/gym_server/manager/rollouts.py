@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gym_server.errors import GymServerError, call_too_long, environment_error, shutting_down
+from gym_server.errors import GymServerError, call_too_long, shutting_down
 from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
@@ -63,8 +63,6 @@ class _Player:
     """A thread with a process.
 
     Attributes:
-        key: None for a process that plays all trusted environments; else the only environment that
-            its process may play.
         process: the process; None until it is started.
         request: what it is playing, or None.
         units: the units that it is playing.
@@ -73,7 +71,6 @@ class _Player:
         known: the numbers of the requests whose task the process has, the latest last.
     """
 
-    key: str | None
     process: WorkerProcess | None = None
     request: RolloutRequest | None = None
     units: range = range(0)
@@ -103,13 +100,13 @@ class Rollouts:
         self._last_played: tuple[str, float] | None = None
         self._stopping = False
 
-    def describe(self, task: Task, trusted: bool) -> dict:
+    def describe(self, task: Task) -> dict:
         """Return the description of an environment; see ``RolloutEnv.describe()``.
 
         Raises:
             GymServerError: see ``play()``.
         """
-        request = self._request(task, "describe", trusted, [Unit(0, ())])
+        request = self._request(task, "describe", [Unit(0, ())])
         self._wait(request, lambda: True)
         if request.failed is not None:
             raise request.failed[1]
@@ -117,14 +114,13 @@ class Rollouts:
         return {**description, "processes": self.most_processes}
 
     def play(
-        self, task: Task, units: Sequence[Unit], trusted: bool, is_wanted: Callable[[], bool]
+        self, task: Task, units: Sequence[Unit], is_wanted: Callable[[], bool]
     ) -> tuple[dict[str, Tensor], GymServerError | None]:
         """Play episodes.
 
         Args:
             task: what they have in common.
             units: the episodes.
-            trusted: whether the environment's code is Gymnasium's own, or ale_py's.
             is_wanted: returns whether the client still waits for them.
 
         Returns:
@@ -135,7 +131,7 @@ class Rollouts:
             GymServerError: ``too_many_rollouts``, ``too_many_processes``, ``shutting_down``; and
                 the error of the first episode.
         """
-        request = self._request(task, "play", trusted, units)
+        request = self._request(task, "play", units)
         self._wait(request, is_wanted)
         if self._stopping:
             raise shutting_down()
@@ -147,11 +143,8 @@ class Rollouts:
                 raise error
         return concatenated(results), error
 
-    def _request(
-        self, task: Task, function: str, trusted: bool, units: Sequence[Unit]
-    ) -> RolloutRequest:
-        key = None if trusted else task.env_key
-        request = RolloutRequest(next(_numbers), task, function, key, units)
+    def _request(self, task: Task, function: str, units: Sequence[Unit]) -> RolloutRequest:
+        request = RolloutRequest(next(_numbers), task, function, units)
         request.waiting.append(range(len(units)))
         with self._changed:
             if self._last_played is not None and self._last_played[0] == task.env_key:
@@ -194,19 +187,12 @@ class Rollouts:
 
     def _start_players(self) -> None:
         """Start as many players as there is work for, within the limit."""
-        # Requests that no process may play yet come first.
-        keys = [player.key for player in self._players]
-        for request in sorted(self._requests, key=lambda one: one.key in keys):
-            own = [player for player in self._players if player.key == request.key]
-            busy = sum(player.request is not None for player in own)
-            left = sum(map(len, request.waiting)) if request.has_work else 0
-            while len(own) - busy < left and len(self._players) < self.most_processes:
-                player = _Player(request.key)
-                own.append(player)
-                self._players.append(player)
-                threading.Thread(
-                    target=self._run, args=(player,), name="rollouts", daemon=True
-                ).start()
+        waiting = sum(len(units) for one in self._requests if one.has_work for units in one.waiting)
+        busy = sum(player.request is not None for player in self._players)
+        while len(self._players) < min(busy + waiting, self.most_processes):
+            player = _Player()
+            self._players.append(player)
+            threading.Thread(target=self._run, args=(player,), name="rollouts", daemon=True).start()
 
     def _run(self, player: _Player) -> None:
         try:
@@ -225,10 +211,8 @@ class Rollouts:
     def _let_process_go(self, player: _Player) -> None:
         with self._changed:
             process, player.process = player.process, None
-        if process is not None and player.key is None:
+        if process is not None:
             pool.put(process)
-        elif process is not None:
-            process.kill()
 
     def _take_turn(self, player: _Player) -> bool:
         """Find something for a player to play; return whether there is anything."""
@@ -236,10 +220,6 @@ class Rollouts:
         with self._changed:
             while not self._stopping:
                 for request in list(self._requests):
-                    if request.key != player.key:
-                        if self._needs_room(request):
-                            return False
-                        continue
                     units = request.take(len(self._players))
                     if units is not None:
                         player.request, player.units = request, units
@@ -260,14 +240,6 @@ class Rollouts:
             request.turn_ends = None
             self._requests.remove(request)
             self._requests.append(request)
-
-    def _needs_room(self, request: RolloutRequest) -> bool:
-        """Whether a request needs a process of its own, and there may be no more."""
-        return (
-            len(self._players) >= self.most_processes
-            and request.has_work
-            and all(one.key != request.key for one in self._players)
-        )
 
     def _play(self, player: _Player) -> None:
         """Let the process play some units, and store the results."""
@@ -304,7 +276,7 @@ class Rollouts:
         """Return how many units were played, their results, and the error that ended them."""
         process = player.process
         if process is None:
-            process = pool.take(_WORKER, low_priority=True, trusted=player.key is None)
+            process = pool.take(_WORKER, low_priority=True)
             process.report_end(lambda why: None)
             player.known.clear()
         process.progress[1] = 0
@@ -312,10 +284,10 @@ class Rollouts:
         player.process = process
         if request.function == "describe":
             process.begin("describe", request.task)
-            return 1, process.finish().value, None
+            return 1, process.finish(), None
         task = None if request.number in player.known else request.task
         process.begin("play", request.number, task, [request.units[unit] for unit in units])
-        body = process.finish().body
+        body = process.finish()
         if task is not None:
             player.known.append(request.number)
         return _read(body)
@@ -398,15 +370,11 @@ class Rollouts:
 
 
 def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:
-    """Read what a process sent, which an untrusted environment may have forged."""
-    try:
-        tensors, metadata = safetensors.read(body)
-        error = None
-        if "error" in metadata:
-            told = json.loads(metadata["error"])
-            error = GymServerError(*[told.get(name) for name in _PARTS_OF_ERRORS])
-            error.is_logged = True
-        return int(metadata["done"]), tensors, error
-    except (AttributeError, KeyError, TypeError, ValueError, GymServerError) as fault:
-        who = "The message from the environment's process cannot be read: it"
-        raise environment_error(fault, who) from fault
+    """Read what a process played; see ``worker.play()``."""
+    tensors, metadata = safetensors.read(body)
+    error = None
+    if "error" in metadata:
+        told = json.loads(metadata["error"])
+        error = GymServerError(*[told.get(name) for name in _PARTS_OF_ERRORS])
+        error.is_logged = True
+    return int(metadata["done"]), tensors, error

@@ -47,9 +47,6 @@ class Pool:
         self,
         module: str,
         low_priority: bool = False,
-        trusted: bool = True,
-        most_mb: int = 0,
-        hint: str | None = None,
     ) -> WorkerProcess:
         """Return an unused process, and start one if necessary.
 
@@ -57,13 +54,8 @@ class Pool:
             module: the module whose functions it is to run.
             low_priority: whether it runs at a lower priority from now on, also for later users.
                 Such processes are not given to callers that did not ask for this.
-            trusted: see ``WorkerProcess``; an untrusted process is always new, and must not be put
-                back.
-            most_mb: the memory limit of a new process in MiB; 0 for the pool's limit.
-            hint: what to do if a new process ends unexpectedly.
         """
-        idle = self._take_idle(low_priority) if trusted else None
-        process = idle or WorkerProcess(most_mb or self.most_mb, trusted, hint)
+        process = self._take_idle(low_priority) or WorkerProcess(self.most_mb)
         process.module = module
         if low_priority:
             process.lower_priority()

@@ -1,7 +1,6 @@
 """A process that the server started: calls to it, and how it ended.
 
-Most of these run what would otherwise run in the server's own process. The server trusts them, and
-both send Python objects. A process for an untrusted environment sends none.
+It runs what would otherwise run in the server's own process.
 """
 
 from __future__ import annotations
@@ -40,8 +39,6 @@ _FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
 class WorkerProcess:
     """A process that runs the functions of one module; of another when it is taken again.
 
-    It has a pipe for calls in turn, and one for queries that it answers meanwhile.
-
     Attributes:
         module: the name of the module.
         pid: the process number.
@@ -50,18 +47,15 @@ class WorkerProcess:
         has_low_priority: whether it runs at a lower priority.
     """
 
-    def __init__(self, most_mb: int = 0, trusted: bool = True, hint: str | None = None) -> None:
+    def __init__(self, most_mb: int = 0) -> None:
         """Start the process.
 
         Args:
             most_mb: its memory limit in MiB; 0 for no limit.
-            trusted: whether it may return any Python object; see ``messages``.
-            hint: what to do if it ends unexpectedly.
         """
         self.module = ""
         self.has_low_priority = False
         self.why: GymServerError | None = None
-        self._hint = hint
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._lock = threading.Lock()
         # Why the server ended it, if it did.
@@ -74,17 +68,12 @@ class WorkerProcess:
         self._ended = threading.Event()
         context = start.context()
         self.progress = context.RawArray("q", 2)
-        pipes = [context.Pipe() for _ in range(2)]
-        self._calls, self._queries = (CallPipe(ours, trusted) for ours, _ in pipes)
+        ours, theirs = context.Pipe()
+        self._calls = CallPipe(ours)
         # Not a daemon: daemons may not start processes, and sub-environments can be processes.
         self._process = context.Process(
             target=serve,
-            args=(
-                *(theirs for _, theirs in pipes),
-                logging.getLogger().level,
-                most_mb,
-                self.progress,
-            ),
+            args=(theirs, logging.getLogger().level, most_mb, self.progress),
             daemon=False,
         )
         try:
@@ -93,12 +82,10 @@ class WorkerProcess:
             threading.Thread(target=self._await_end, daemon=True).start()
         except BaseException:
             self._send_kill()
-            for pipe in (self._calls, self._queries):
-                pipe.close()
+            self._calls.close()
             raise
         finally:
-            for _, theirs in pipes:
-                theirs.close()
+            theirs.close()
         # When multiprocessing starts a process it polls all on this list, and at exit it waits for
         # all of them. Only our own thread may wait for this one.
         # The type is ignored because the list is private.
@@ -115,8 +102,7 @@ class WorkerProcess:
         """Call a function of its module; the caller ensures that only one call runs.
 
         Returns:
-            The function's result: ``Ready``, ``Result``, or from a trusted process any other
-            object.
+            The function's result.
 
         Raises:
             GymServerError: the function's error, ``environment_died``, or why the process was
@@ -140,27 +126,6 @@ class WorkerProcess:
             return self._calls.finish()
         except _FAULTS as fault:
             raise self._end_after(fault) from None
-
-    def query(self, function: str, *args: object, timeout: float | None = None) -> Any:
-        """Call a function; the process answers even while a ``call()`` runs.
-
-        Raises:
-            GymServerError: as for ``call()``.
-            TimeoutError: it took longer than ``timeout`` seconds.
-        """
-        if self.why is not None:
-            raise self.why.again()
-        try:
-            return self._queries.call(f"{self.module}:{function}", *args, timeout=timeout)
-        except TimeoutError:
-            raise
-        except _FAULTS as fault:
-            raise self._end_after(fault) from None
-
-    @property
-    def query_since(self) -> float | None:
-        """When the current ``query()`` started, in the clock's seconds; None if there is none."""
-        return self._queries.busy_since
 
     def _end_after(self, fault: Exception) -> GymServerError:
         """Make sure that the process has ended; return the reason."""
@@ -234,9 +199,8 @@ class WorkerProcess:
             self.why = self._our_reason or self._died(code)
             was_expected = self._end_expected or self._our_reason is not None
         self._ended.set()
-        for pipe in (self._calls, self._queries):
-            pipe.wake()
-            pipe.close()
+        self._calls.wake()
+        self._calls.close()
         self._process.close()
         if not was_expected:
             log.warning("Process %d: %s", self.pid, self.why.message)
@@ -249,7 +213,7 @@ class WorkerProcess:
                 os.killpg(self.pid, signal.SIGKILL)
 
     def _died(self, code: int | None) -> GymServerError:
-        return environment_died(self._fault or _how(code), self._phase, self._hint)
+        return environment_died(self._fault or _how(code), self._phase)
 
 
 def _how(code: int | None) -> str:

@@ -17,12 +17,11 @@ from gym_server.protocol.safetensors import (
     TENSORS,
     Parts,
     Tensor,
-    add_metadata,
     quoted,
     write,
 )
 from gym_server.protocol.safetensors import join as join_tensors
-from gym_server.response import JSON, Response
+from gym_server.response import Response
 
 HTML = "text/html"
 
@@ -86,20 +85,6 @@ class AnswerForm(NamedTuple):
 JSON_FORM = AnswerForm()
 
 
-class Ready(NamedTuple):
-    """A body from an environment's process that lacks only the request's idempotency key.
-
-    Attributes:
-        body: the body.
-        content_type: its type.
-        steps: the number of steps it took, over all sub-environments.
-    """
-
-    body: bytes
-    content_type: str
-    steps: int = 0
-
-
 def tensor_response(
     arrays: Mapping[str, np.ndarray], metadata: Mapping[str, str], by_column: bool
 ) -> Response:
@@ -109,20 +94,18 @@ def tensor_response(
 
 
 def response_to(
-    result: dict | Response | Ready | None, request_id: RequestId | None, status: int = 200
+    result: dict | Response | None, request_id: RequestId | None, status: int = 200
 ) -> Response:
     """Turn a route's result into a response.
 
     Args:
-        result: a JSON object, whose observations may be tensors; a finished response; a finished
-            body; or None for no content (204).
+        result: a JSON object, whose observations may be tensors; a finished response; or
+            None for no content (204).
         request_id: the client's idempotency key, echoed if given.
         status: the HTTP status of a JSON object.
     """
     if isinstance(result, Response):
         return result
-    if isinstance(result, Ready):
-        return Response(status, _with_request(result, request_id), result.content_type)
     if result is None:
         headers = () if request_id is None else (("Gym-Request", "{} {}".format(*request_id)),)
         # Strictly typed classic clients expect Flask's default content type here.
@@ -133,14 +116,6 @@ def response_to(
     if request_id is not None:
         result = {**result, "request": request_id._asdict()}
     return Response(status, dumps(result))
-
-
-def _with_request(ready: Ready, request_id: RequestId | None) -> bytes:
-    if request_id is None:
-        return ready.body
-    if ready.content_type != JSON:
-        return add_metadata(ready.body, _request_metadata(request_id))
-    return b'%b,"request":%b}' % (ready.body[:-1], dumps(request_id._asdict()))
 
 
 def _dumps_tensors(

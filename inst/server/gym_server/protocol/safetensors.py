@@ -143,18 +143,6 @@ def join(tensors: Mapping[str, Tensor], metadata: bytes) -> bytes:
     return b"".join((*_headed(header), *[tensors[name].data for name in names]))
 
 
-def add_metadata(file: bytes, metadata: bytes) -> bytes:
-    """Append to the metadata of a file, which must not be empty.
-
-    Args:
-        file: a file from ``join()``.
-        metadata: the result of ``quoted()``.
-    """
-    end = 8 + int.from_bytes(file[:8], "little")
-    header = b"%b,%b}}" % (file[8:end].rstrip(b" ").removesuffix(b"}}"), metadata)
-    return b"".join((*_headed(header), file[end:]))
-
-
 def _headed(header: bytes) -> tuple[bytes, bytes]:
     """Pad a header; return its length as bytes, and the header."""
     header += b" " * (-len(header) % 8)

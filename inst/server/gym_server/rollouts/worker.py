@@ -13,9 +13,8 @@ from gym_server.envs.make import call_env
 from gym_server.errors import GymServerError, answer_to, environment_error
 from gym_server.policies import read_policy
 from gym_server.processes import serve, start
-from gym_server.processes.messages import Result
-from gym_server.protocol.answers import Ready, dumps
-from gym_server.protocol.safetensors import TENSORS, Tensor, write
+from gym_server.protocol.answers import dumps
+from gym_server.protocol.safetensors import Tensor, write
 from gym_server.rollouts.environment import RolloutEnv
 from gym_server.rollouts.episode import Played, play_episode
 from gym_server.rollouts.group import play_group
@@ -37,12 +36,12 @@ _environments: OrderedDict[str, RolloutEnv] = OrderedDict()
 _tasks: OrderedDict[int, _Playing] = OrderedDict()
 
 
-def describe(task: Task) -> Result:
+def describe(task: Task) -> dict:
     """Return the description of a task's environment; see ``RolloutEnv.describe()``."""
-    return Result(_environment(task).describe(), None)
+    return _environment(task).describe()
 
 
-def play(number: int, task: Task | None, units: Sequence[Unit]) -> Ready:
+def play(number: int, task: Task | None, units: Sequence[Unit]) -> bytes:
     """Play for some milliseconds.
 
     Args:
@@ -107,7 +106,7 @@ class _Playing:
     def _env(self) -> RolloutEnv:
         return _environment(self._task)
 
-    def play(self, units: Sequence[Unit]) -> Ready:
+    def play(self, units: Sequence[Unit]) -> bytes:
         self._check_rows(units[0])
         due = time.monotonic() + _SECONDS
         play = self._play_episodes if self._env.group is None else self._play_groups
@@ -115,7 +114,7 @@ class _Playing:
         metadata = {"done": str(done)}
         if error is not None:
             metadata["error"] = dumps(answer_to(error)[1]).decode("ascii")
-        return Ready(write(tensors, metadata), TENSORS)
+        return write(tensors, metadata)
 
     def _check_rows(self, unit: Unit) -> None:
         group, env_id = self._env.group, self._task.config.env_id

@@ -43,9 +43,8 @@ def test_the_end_of_standard_input_stops_it_and_without_a_line_removes_the_log(
 
 
 @needs_signals
-@pytest.mark.parametrize("isolate", ["all", "none"])
-def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path, isolate):
-    server = serve("--isolate", isolate, limits=SHORT_GRACE, TMPDIR=str(tmp_path))
+def test_a_call_that_hangs_at_the_end_leaves_no_temporary_folder(serve, tmp_path):
+    server = serve(limits=SHORT_GRACE, TMPDIR=str(tmp_path))
     how = {"num_envs": 1, "vectorization_mode": "async"}
     # The second one uses the processes that the first one left.
     urls = [server.create("faulty_envs:Hanging-v0", **how) for _ in range(2)]
@@ -100,7 +99,7 @@ def test_a_monitor_directory_that_cannot_be_made_is_one_line_and_status_1(tmp_pa
         ["--port", "x"],
         ["--max-body-mb", "0"],
         ["--max-num-envs", "0"],
-        ["--max-worker-mb", "-1"],
+        ["--max-processes", "0"],
     ],
 )
 def test_options_out_of_range_are_refused(options, capsys):
@@ -182,3 +181,25 @@ def test_what_never_returns_does_not_keep_it_alive(serve, tmp_path, gate, eventu
 def _without_answer(call, url):
     with pytest.raises((OSError, http.client.HTTPException)):
         call(url, {"action": 0}) if url.endswith("step/") else call(url)
+
+
+@pytest.mark.parametrize(
+    ("option", "instead"), [("--isolate", "--users"), ("--max-worker-mb", "--max-memory-mb")]
+)
+def test_an_option_that_is_gone_names_what_replaces_it(option, instead, capsys):
+    for written in ([option, "all"], [f"{option}=all"]):
+        with pytest.raises(SystemExit):
+            main.main(written)
+        said = capsys.readouterr().err
+        assert f"{option} is gone" in said and instead in said
+
+
+@needs_signals
+def test_a_call_that_holds_pythons_lock_for_too_long_ends_the_server(serve):
+    server = serve("--allow-module", "faulty_envs", "--max-call-seconds", "1")
+    url = server.create("faulty_envs:Rogue-v0", kwargs={"does": "never_returns"})
+    server.post(f"{url}/reset/")
+    with pytest.raises((OSError, http.client.HTTPException)):
+        server.post(f"{url}/step/", {"action": 0})
+    assert server.process.wait(20) == 1
+    assert "never_returns" in server.process.stderr.read()

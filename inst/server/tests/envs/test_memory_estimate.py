@@ -1,6 +1,5 @@
 """Memory is estimated before it is used, for all environments together."""
 
-import sys
 import tracemalloc
 
 import gymnasium
@@ -32,11 +31,9 @@ def limited():
     """Return a client of an application with a memory limit in MiB."""
     apps = []
 
-    def limited(max_memory_mb=Limits.max_memory_mb, isolate="none"):
+    def limited(max_memory_mb=Limits.max_memory_mb):
         limits = Limits(max_memory_mb=max_memory_mb)
-        apps.append(
-            create_app(Config(allowed_modules=["faulty_envs"], limits=limits, isolate=isolate))
-        )
+        apps.append(create_app(Config(allowed_modules=["faulty_envs"], limits=limits)))
         return apps[-1].test_client()
 
     yield limited
@@ -133,21 +130,6 @@ def test_a_picture_that_cannot_fit_is_refused_before_it_is_drawn(limited, how):
     assert usual.status_code == 200 or usual.json["code"] == "missing_dependency"
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="a process's memory is limited on Linux")
-def test_what_may_take_much_at_once_is_made_in_a_process(limited):
-    client = limited(isolate="foreign")
-    pictures = [{"name": "AddRenderObservation"}]
-    for wrappers, isolated in [(pictures, False), ([*pictures, *stacks(2)], True)]:
-        created = create(client, wrappers=wrappers, num_envs=2)
-        assert created.status_code == 200, created.json
-        url = f"/v1/envs/{created.json['instance_id']}"
-        assert client.get(url).json["isolated"] is isolated
-        assert client.post(f"{url}/close/").status_code == 204
-    assert client.application._instances._budget.left == 4096 * MB
-    # An environment that fits nowhere is refused without trying it in a process.
-    assert refused(create(client, wrappers=[*pictures, *stacks(1000)], num_envs=2))
-
-
 def test_sub_environments_count(limited):
     client = limited()
     # 600 x 400 x 3 bytes, which are sent as small integers.
@@ -165,16 +147,6 @@ def test_what_all_have_together_counts_until_it_is_closed(limited):
     assert create(client).status_code == 200
     client.post(f"/v1/envs/{first.json['instance_id']}/close/")
     assert create(client, wrappers=stacks(1000, 100), num_envs=1).status_code == 200
-
-
-def test_an_environment_with_a_process_of_its_own_counts_as_well(limited):
-    client = limited(max_memory_mb=70, isolate="all")
-    first = create(client, wrappers=stacks(1000, 100))
-    assert first.status_code == 200, first.json
-    assert client.application._instances._budget.left < 40 * MB
-    assert refused(create(client, wrappers=stacks(1000, 100)))
-    client.post(f"/v1/envs/{first.json['instance_id']}/close/")
-    assert client.application._instances._budget.left == 70 * MB
 
 
 def test_a_vector_implementation_that_was_tried_in_vain_is_not_counted(limited):

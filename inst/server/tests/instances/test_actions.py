@@ -3,7 +3,6 @@
 import gymnasium
 import numpy as np
 import pytest
-from conftest import ON_A_FREE_PORT, ServerProcess
 from faulty_envs import SPACES
 from gymnasium.spaces import Box, Dict, Discrete, Graph, MultiBinary, OneOf, Sequence, Tuple
 
@@ -63,22 +62,6 @@ def test_so_do_its_sub_envs(client, create, mode):
             assert answer.status_code == 200, answer.json
             assert answer.json["observation"] == [observation.tolist()] * 2
         client.post(f"{url}/close/")
-
-
-@pytest.fixture(scope="module")
-def isolating():
-    """Start a server that runs each environment in its own process."""
-    server = ServerProcess(*ON_A_FREE_PORT, "--isolate", "all")
-    yield server
-    server.kill()
-
-
-def test_so_does_one_in_a_process_of_its_own(isolating):
-    url = isolating.create("Pendulum-v1")
-    isolating.post(f"{url}/reset/", {"seed": 1})
-    for action, (observation, _) in zip(OUTSIDE, in_process(OUTSIDE), strict=True):
-        status, answer = isolating.post(f"{url}/step/", {"action": [action]})
-        assert (status, answer["observation"]) == (200, observation.tolist())
 
 
 @pytest.mark.parametrize(
@@ -187,14 +170,6 @@ def test_an_environment_that_refuses_it_itself_gets_a_hint(client, create, field
     assert (answer.status_code, answer.json["code"]) == (500, "environment_error")
     assert "AssertionError: no action" in answer.json["message"]
     assert 'gym_wrap(..., "ClipAction")' in answer.json["hint"]
-
-
-def test_the_hint_comes_out_of_a_process_of_its_own(isolating):
-    url = isolating.create("faulty_envs:Insists-v0", kwargs={"space": "half", "longest": 99})
-    isolating.post(f"{url}/reset/", {"seed": 1})
-    status, answer = isolating.post(f"{url}/step/", {"action": 7.5})
-    assert status == 500
-    assert 'gym_wrap(..., "ClipAction")' in answer["hint"]
 
 
 def test_a_failure_of_another_kind_gets_none(client, create):

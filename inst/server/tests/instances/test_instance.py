@@ -232,7 +232,6 @@ def test_all_about_an_instance(client, create):
         "needs_reset": False,
         "monitor": None,
         "watched": False,
-        "isolated": False,
     }
 
 

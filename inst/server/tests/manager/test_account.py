@@ -45,9 +45,7 @@ def test_above_the_limit_nothing_grows(client, monkeypatch):
 @pytest.fixture
 def limited(serve):
     """Start a server with a memory limit of 100 MiB."""
-    return lambda isolate: serve(
-        "--isolate",
-        isolate,
+    return lambda: serve(
         "--max-memory-mb",
         "100",
         limits={
@@ -67,7 +65,7 @@ def drawn(server, url):
 
 @pytest.mark.parametrize("how", [{}, {"num_envs": 2, "vectorization_mode": "sync"}])
 def test_what_grows_when_it_is_drawn_is_closed_and_the_others_go_on(limited, eventually, how):
-    server = limited("none")
+    server = limited()
     other = server.create("CartPole-v1")
     hoarder = server.create("faulty_envs:Drawing-v0", kwargs=HOARDER, **how)
     for url in (other, hoarder):
@@ -84,12 +82,13 @@ def test_what_grows_when_it_is_drawn_is_closed_and_the_others_go_on(limited, eve
 
 
 def test_a_process_that_grows_is_closed(limited, eventually):
-    server = limited("foreign")
-    other = server.create("faulty_envs:Rogue-v0")
-    hoarder = server.create("faulty_envs:Rogue-v0", kwargs={"does": "grows"})
+    server = limited()
+    how = {"num_envs": 1, "vectorization_mode": "async"}
+    other = server.create("faulty_envs:Rogue-v0", **how)
+    hoarder = server.create("faulty_envs:Rogue-v0", kwargs={"does": "grows"}, **how)
     for url in (other, hoarder):
         assert server.post(f"{url}/reset/")[0] == 200
-    server.post(f"{hoarder}/step/", {"action": 0})
+    server.post(f"{hoarder}/step/", {"action": [0]})
     eventually(lambda: server.get(hoarder)[1].get("code") == "instance_memory_closed")
     eventually(lambda: server.get("/v1/envs/")[1]["all_envs"].keys() == {other[-8:]})
     assert server.post(f"{other}/reset/")[0] == 200

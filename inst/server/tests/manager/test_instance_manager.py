@@ -1,13 +1,8 @@
-import os
 import re
-import signal
 import threading
 import time
 
 import pytest
-
-from gym_server.api.app import Config, create_app
-from gym_server.manager.instance_manager import InstanceManager
 
 
 @pytest.fixture
@@ -127,26 +122,6 @@ def test_at_the_end_everything_is_closed_and_nothing_more_is_made(app, client, c
 def test_an_environment_that_fails_to_close_does_not_keep_the_others_open(app, faulty, create):
     faulty("RaisesInClose"), create()
     app._instances.close_all()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_a_process_that_ends_before_its_instance_is_listed_leaves_no_instance(
-    monkeypatch, eventually
-):
-    app = create_app(Config(isolate="all"))
-    enlist = InstanceManager._enlist
-
-    def end_it_and_enlist(self, instance, creation):
-        os.kill(instance._process.pid, signal.SIGKILL)
-        eventually(lambda: instance._process.why is not None)
-        return enlist(self, instance, creation)
-
-    monkeypatch.setattr(InstanceManager, "_enlist", end_it_and_enlist)
-    client = app.test_client()
-    answer = client.post("/v1/envs/", json={"env_id": "CartPole-v1"})
-    assert (answer.status_code, answer.json["code"]) == (500, "environment_died")
-    assert client.get("/v1/envs/").json["all_envs"] == {}
-    app.close()
 
 
 def test_instances_are_listed_with_who_uses_them_how_much(client, create):

@@ -1,14 +1,11 @@
 """Limits for all clients together."""
 
-import os
 import threading
 
 import pytest
-from running import descendants
 
 from gym_server.api.app import Config, create_app
 from gym_server.errors import GymServerError
-from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager.limits import Limits, Room, Watchers
 from gym_server.vector_envs.sub_envs import SubEnvs
 
@@ -20,12 +17,8 @@ def limited():
     """Return a client of an application with limits."""
     apps = []
 
-    def limited(isolate="none", **limits):
-        apps.append(
-            create_app(
-                Config(allowed_modules=["faulty_envs"], limits=Limits(**limits), isolate=isolate)
-            )
-        )
+    def limited(**limits):
+        apps.append(create_app(Config(allowed_modules=["faulty_envs"], limits=Limits(**limits))))
         return apps[-1].test_client()
 
     yield limited
@@ -183,19 +176,6 @@ def test_processes_that_nobody_asked_for_are_no_more_than_there_is_room_for(limi
     assert chosen_of(client) == 4
 
 
-@pytest.mark.parametrize("told", [-5, "many", None])
-def test_what_an_isolated_environment_tells_of_its_processes_frees_no_room(
-    limited, monkeypatch, told
-):
-    about = IsolatedInstance._about
-    monkeypatch.setattr(
-        IsolatedInstance, "_about", lambda self: {**about(self), "num_workers": told}
-    )
-    client = limited(isolate="all", max_processes=4)
-    assert ask_for_processes(client, 2).status_code == 200
-    assert refused(make(client), "too_many_processes")
-
-
 def test_processes_that_are_started_at_once_are_no_more(limited):
     client = limited(max_processes=4)
     answers = []
@@ -232,27 +212,12 @@ def test_processes_count_until_they_have_ended(limited, monkeypatch):
     assert ask_for_processes(client, 2).status_code == 200
 
 
-def test_isolated_environments_and_their_processes_count(limited):
-    client = limited(max_processes=5, isolate="all")
-    # Its own process, a fork server and the processes that this forks.
-    before = len(descendants(os.getpid()))
-    first = ask_for_processes(client, 2)
-    assert first.status_code == 200
-    # The server itself has one fork server and one resource tracker.
-    assert len(descendants(os.getpid())) - before <= 4 + 2
-    assert refused(ask_for_processes(client, 1), "too_many_processes")
-    second = make(client)
-    assert second.status_code == 200
-    assert refused(make(client), "too_many_processes")
-    assert client.post(f"/v1/envs/{second.json['instance_id']}/close/").status_code == 204
-    assert make(client).status_code == 200
-
-
 def test_a_process_that_ended_by_itself_makes_room(limited, eventually):
-    client = limited(max_processes=1, isolate="all")
+    client = limited(max_processes=1)
     kwargs = {"does": "exits", "at": "step"}
-    answer = make(client, env_id="faulty_envs:Rogue-v0", kwargs=kwargs)
+    how = {"num_envs": 1, "vectorization_mode": "async"}
+    answer = make(client, env_id="faulty_envs:Rogue-v0", kwargs=kwargs, **how)
     url = f"/v1/envs/{answer.json['instance_id']}"
     client.post(f"{url}/reset/")
-    assert client.post(f"{url}/step/", json={"action": 0}).json["code"] == "environment_died"
-    eventually(lambda: make(client).status_code == 200)
+    assert client.post(f"{url}/step/", json={"action": [0]}).json["code"] == "environment_died"
+    eventually(lambda: ask_for_processes(client, 1).status_code == 200)

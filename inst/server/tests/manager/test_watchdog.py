@@ -4,8 +4,6 @@ import contextlib
 import http.client
 import json
 import os
-import queue
-import signal
 import threading
 import time
 from pathlib import Path
@@ -13,10 +11,8 @@ from pathlib import Path
 import pytest
 from conftest import ON_A_FREE_PORT, Gate, ServerProcess, created
 from faulty_envs import HangsWhere
-from running import descendants, is_running, is_stopped
+from running import descendants, is_running
 
-from gym_server.api.app import Config, create_app
-from gym_server.isolation.isolated_instance import IsolatedInstance
 from gym_server.manager import watchdog
 from gym_server.manager.limits import Limits
 
@@ -49,7 +45,7 @@ class Call:
 
 
 # Calls that do not hang take less, even on a busy machine.
-STRICT = ("--max-call-seconds", "1", "--isolate", "none")
+STRICT = ("--max-call-seconds", "1")
 
 
 @pytest.fixture(scope="module")
@@ -212,50 +208,6 @@ def test_sub_envs_in_processes_end_with_it(impatient_later, eventually):
     eventually(lambda: not any(map(is_running, processes)))
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_an_isolated_environment_ends_with_it(impatient_later, eventually):
-    app, be_impatient = impatient_later(isolate="all")
-
-    def ask(method, path, **body):
-        # A client must not be shared by threads.
-        answer = app.test_client().open(path, method=method, json=body or None)
-        return answer.status_code, answer.json
-
-    def rogue(does):
-        url = created(app.test_client(), "faulty_envs:Rogue-v0", kwargs={"does": does})
-        return url, ask("POST", f"{url}/reset/")[1]["info"]["pid"]
-
-    def begin(*args, **body):
-        # A daemon thread, in case it never returns.
-        answers = queue.SimpleQueue()
-        call = threading.Thread(target=lambda: answers.put(ask(*args, **body)), daemon=True)
-        call.start()
-        return answers
-
-    other, _ = rogue("nothing")
-    url, hanging = rogue("never_returns")
-    still, stopped = rogue("nothing")
-    os.kill(stopped, signal.SIGSTOP)
-    eventually(lambda: is_stopped(stopped))
-    be_impatient()
-    kwargs = {"does": "never_returns", "at": "constructor"}
-    try:
-        # One hangs, and the others wait for it.
-        calls = [begin("POST", f"{url}/step/", action=0) for _ in range(3)]
-        calls.append(begin("POST", "/v1/envs/", env_id="faulty_envs:Rogue-v0", kwargs=kwargs))
-        # Also a call that does not wait for the environment.
-        calls.append(begin("GET", f"{still}/action_space/"))
-        assert all(too_long(answers.get(timeout=SOON)) for answers in calls)
-        assert too_long(ask("POST", f"{url}/step/", action=0))
-        eventually(lambda: not is_running(hanging) and not is_running(stopped))
-    finally:
-        for pid in (hanging, stopped):
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
-    assert list(ask("GET", "/v1/envs/")[1]["all_envs"]) == [other.rsplit("/", 1)[1]]
-    assert ask("POST", f"{other}/step/", action=0)[0] == 200
-
-
 def test_a_connection_that_was_answered_for_is_closed(strict, eventually):
     url = hanging(strict, "reset")
     connection = strict.connect()
@@ -345,7 +297,7 @@ def test_one_that_was_evicted_may_hang_once_more_and_others_are_drawn(quick, mon
 @pytest.fixture(scope="module")
 def impatient():
     """Start a server on which a call may take half a second."""
-    options = ("--max-call-seconds", "0.5", "--isolate", "none", "--log-level", "error")
+    options = ("--max-call-seconds", "0.5", "--log-level", "error")
     server = ServerProcess(*ON_A_FREE_PORT, *options)
     yield server
     server.kill()
@@ -400,29 +352,6 @@ def test_a_loop_without_an_end_is_broken_off(impatient, eventually, where, field
     eventually(lambda: _busy_threads(server.process.pid) == 0)
     # Only the two remain that start processes.
     eventually(lambda: len(descendants(server.process.pid)) <= 2)
-
-
-def test_the_start_of_a_process_is_never_broken_off(monkeypatch, eventually):
-    started = []
-
-    class StartsSlowly(IsolatedInstance):
-        def __init__(self, *args):
-            end = time.monotonic() + 0.8
-            while time.monotonic() < end:
-                pass
-            super().__init__(*args)
-            started.append(self._process.pid)
-
-    monkeypatch.setattr("gym_server.manager.instance_manager.IsolatedInstance", StartsSlowly)
-    limits = Limits(max_call_seconds=0.3)
-    app = create_app(Config(limits=limits, isolate="all"))
-    try:
-        answer = app.test_client().post("/v1/envs/", json={"env_id": "CartPole-v1"})
-        assert too_long((answer.status_code, answer.json))
-        assert len(started) == 1
-        eventually(lambda: not is_running(started[0]))
-    finally:
-        app.close()
 
 
 def _busy_threads(pid):

@@ -17,9 +17,9 @@ def limited(monitor_dir, monkeypatch):
     monkeypatch.setattr(recording, "_MEASURE_SECONDS", 0.0)
     apps = []
 
-    def limited(max_monitor_mb, isolate="none"):
+    def limited(max_monitor_mb):
         limits = Limits(max_monitor_mb=max_monitor_mb)
-        apps.append(create_app(Config(monitor_dir=monitor_dir, limits=limits, isolate=isolate)))
+        apps.append(create_app(Config(monitor_dir=monitor_dir, limits=limits)))
         return apps[-1].test_client()
 
     yield limited
@@ -47,9 +47,8 @@ def recorded(directory):
         return len(list(csv.reader(table))) - 1
 
 
-@pytest.mark.parametrize("isolate", ["none", "all"])
-def test_a_full_monitor_stops_recording_and_says_so(limited, monitor_dir, isolate):
-    client = limited(16 * KIB, isolate)
+def test_a_full_monitor_stops_recording_and_says_so(limited, monitor_dir):
+    client = limited(16 * KIB)
     url = created(client)
     assert start(client, url, "run").status_code == 204
     play(client, url)

@@ -9,7 +9,6 @@ import pytest
 from conftest import ServerProcess
 from running import descendants, is_running
 
-from gym_server.isolation.worker import WorkerSettings
 from gym_server.processes.worker_process import WorkerProcess
 
 pytestmark = [
@@ -19,19 +18,20 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory):
-    forged = tmp_path_factory.mktemp("forged") / "file"
-    server = ServerProcess("--port", "0", "--allow-module", "faulty_envs", FORGED_FILE=str(forged))
-    server.forged = forged
+def server():
+    server = ServerProcess("--port", "0", "--allow-module", "faulty_envs")
     yield server
     server.kill()
 
 
+IN_A_PROCESS = {"num_envs": 1, "vectorization_mode": "async"}
+
+
 def rogue(server, **kwargs):
-    url = server.create("faulty_envs:Rogue-v0", kwargs=kwargs)
+    url = server.create("faulty_envs:Rogue-v0", kwargs=kwargs, **IN_A_PROCESS)
     status, answer = server.post(f"{url}/reset/")
     assert status == 200, answer
-    return url, answer["info"]["pid"]
+    return url, answer["info"]["pid"][0]
 
 
 ENDS = [
@@ -47,35 +47,22 @@ ENDS = [
 @pytest.mark.parametrize(("does", "how"), ENDS)
 def test_it_is_told_how_a_process_ended_and_the_instance_is_gone(server, does, how, eventually):
     url, pid = rogue(server, does=does)
-    status, answer = server.post(f"{url}/step/", {"action": 0})
+    status, answer = server.post(f"{url}/step/", {"action": [0]})
     assert (status, answer["code"]) == (500, "environment_died")
     assert how in answer["message"]
     # All later calls get the reason.
     eventually(lambda: url[-8:] not in server.get("/v1/envs/")[1]["all_envs"])
     for method, path in [(server.post, "step/"), (server.get, ""), (server.post, "close/")]:
-        arguments = [{"action": 0}] if path == "step/" else []
+        arguments = [{"action": [0]}] if path == "step/" else []
         assert method(f"{url}/{path}", *arguments) == (status, answer)
     eventually(lambda: not is_running(pid))
     assert server.get("/v1/health/")[0] == 200
 
 
-def test_an_isolated_environment_ends_with_the_process_of_its_sub_environments(server, eventually):
-    before = server.get("/v1/envs/")[1]["all_envs"]
-    url = server.create(
-        "faulty_envs:Rogue-v0", num_envs=2, vectorization_mode="async", num_workers=1
-    )
-    status, answer = server.post(f"{url}/reset/")
-    assert status == 200, answer
-    os.kill(answer["info"]["pid"][0], signal.SIGKILL)
-    # Without another call.
-    eventually(lambda: server.get("/v1/envs/")[1]["all_envs"] == before)
-    assert server.post(f"{url}/reset/")[1]["code"] == "environment_died"
-
-
 def test_what_it_forked_ends_with_it(server, eventually):
     before = set(descendants(server.process.pid))
     url, pid = rogue(server, does="forks_and_exits")
-    server.post(f"{url}/step/", {"action": 0})
+    server.post(f"{url}/step/", {"action": [0]})
     eventually(lambda: not any(is_in_group(one, pid) for one in _all_processes()))
     assert set(descendants(server.process.pid)) <= before
 
@@ -100,29 +87,20 @@ def is_running_safely(pid):
 
 
 def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
-    process = WorkerProcess(trusted=False)
-    process.module = "gym_server.isolation.worker"
-    process.begin("list_registry", "CartPole", WorkerSettings(frozenset()))
+    process = WorkerProcess()
+    process.module = "gym_server.envs.registry"
+    process.begin("search", "CartPole", ())
     eventually(lambda: process._calls._pipe.poll(0))
     os.kill(process.pid, signal.SIGKILL)
     eventually(lambda: not process.is_alive)
     # The thread that waited for the end now closes its pipes.
     time.sleep(0.2)
-    assert process.finish().value[0]["id"].startswith("CartPole-v")
+    assert process.finish()[0]["id"].startswith("CartPole-v")
 
 
-@pytest.mark.parametrize("at", ["constructor", "close", "render"])
-def test_it_is_told_wherever_it_ends(server, at):
-    if at == "constructor":
-        kwargs = {"does": "exits", "at": at}
-        status, answer = server.post(
-            "/v1/envs/", {"env_id": "faulty_envs:Rogue-v0", "kwargs": kwargs}
-        )
-        assert "while it was created: exit status 7" in answer["message"]
-    else:
-        url, _ = rogue(server, does="exits", at=at)
-        call = server.get if at == "render" else server.post
-        status, answer = call(f"{url}/{at}/")
+def test_it_is_told_when_it_ends_while_it_draws(server):
+    url, _ = rogue(server, does="exits", at="render")
+    status, answer = server.get(f"{url}/render/")
     assert (status, answer["code"]) == (500, "environment_died")
 
 
@@ -143,18 +121,10 @@ def test_a_watcher_hears_of_the_end(server):
 @pytest.mark.parametrize("does", ["prints", "ignores_sigterm"])
 def test_what_is_no_end_is_none(server, does, eventually):
     url, pid = rogue(server, does=does)
-    assert server.post(f"{url}/step/", {"action": 0})[0] == 200
-    assert server.post(f"{url}/step/", {"action": 0})[0] == 200
+    assert server.post(f"{url}/step/", {"action": [0]})[0] == 200
+    assert server.post(f"{url}/step/", {"action": [0]})[0] == 200
     assert server.post(f"{url}/close/")[0] == 204
     eventually(lambda: not is_running(pid))
-
-
-def test_nothing_that_it_sends_runs_in_the_server(server):
-    url, _ = rogue(server, does="forges")
-    answer = server.post(f"{url}/step/", {"action": 0})[1]
-    assert answer["code"] == "environment_died"
-    assert "an answer to no call" in answer["message"] or "it sent" in answer["message"]
-    assert not server.forged.exists()
 
 
 def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
@@ -176,10 +146,9 @@ def test_one_that_ends_its_process_disturbs_none_of_twenty_that_run(server):
     threads = [threading.Thread(target=run, args=(url,)) for url in urls]
     for thread in threads:
         thread.start()
-    assert server.post(f"{ending}/step/", {"action": 0})[1]["code"] == "environment_died"
+    assert server.post(f"{ending}/step/", {"action": [0]})[1]["code"] == "environment_died"
     for thread in threads:
         thread.join(60)
-    print(f"isolation: others disturbed {len(disturbed)} of {len(urls)}")
     assert disturbed == []
     for url in urls:
         server.post(f"{url}/close/")
@@ -205,17 +174,17 @@ def test_no_process_outlives_the_server(serve, how, eventually):
 
 def _without_answer(server, url):
     try:
-        server.post(url, {"action": 0})
+        server.post(url, {"action": [0]})
     except Exception:
         return
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="Linux limits memory so")
-@pytest.mark.parametrize("limit", [("--max-worker-mb", "600"), ("--max-memory-mb", "100")])
+@pytest.mark.parametrize("limit", [("--max-memory-mb", "100")])
 def test_a_process_gets_no_more_memory_than_it_may_have(serve, limit):
     server = serve(*limit)
     url, _ = rogue(server, does="hoards")
-    status, answer = server.post(f"{url}/step/", {"action": 0})
+    status, answer = server.post(f"{url}/step/", {"action": [0]})
     assert (status, answer["code"]) == (500, "environment_error")
     assert "MemoryError" in answer["message"]
     assert server.get("/v1/health/")[0] == 200
@@ -235,5 +204,5 @@ def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
         url, _ = rogue(server)
         assert server.post(f"{url}/close/")[0] == 204
         url, _ = rogue(server, does="exits")
-        server.post(f"{url}/step/", {"action": 0})
+        server.post(f"{url}/step/", {"action": [0]})
     eventually(lambda: all(a <= b for a, b in zip(left(), before, strict=True)))

@@ -6,7 +6,7 @@ import pytest
 import safetensors.numpy
 
 from gym_server.errors import GymServerError
-from gym_server.protocol.safetensors import TENSORS, Tensor, add_metadata, quoted, read, write
+from gym_server.protocol.safetensors import TENSORS, Tensor, read, write
 
 DTYPES = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "?"]
 
@@ -347,12 +347,3 @@ def test_the_same_number_for_another_kind_of_answer_is_a_conflict(client, faulty
     answer = step(client, url, arrays, numbered(1))
     assert (answer.status_code, answer.json["code"]) == (409, "request_conflict")
     assert client.get(url).json["steps"] == 1
-
-
-@pytest.mark.parametrize("metadata", [{"info": "{}"}, {"info": '{"a":"}}  "}', "texts": "ä"}])
-@pytest.mark.parametrize("text", ["{}", '{"key":"\\"}}\\u00e4","number":1}'])
-def test_a_file_takes_one_more_text_as_if_it_had_been_written_with_it(metadata, text):
-    tensors = {"a": Tensor.of(np.arange(3.0)), "b": Tensor.of(np.array(True))}
-    more = add_metadata(write(tensors, metadata), quoted({"request": text}))
-    assert more == write(tensors, {**metadata, "request": text})
-    assert safetensors.numpy.load(more).keys() == {"a", "b"}

@@ -1,1 +1,0 @@
-"""Environments in their own processes."""
