@@ -26,7 +26,10 @@ class FrontProcess(ServerProcess):
 
     def __init__(self, folder, *options, tokens=TOKENS, **how):
         self.file = write_users(folder / "users", **tokens)
-        super().__init__("--port", "0", "--users", str(self.file), *options, **how)
+        runs = str(folder / "runs")
+        super().__init__(
+            *("--port", "0", "--users", str(self.file), "--monitor-dir", runs), *options, **how
+        )
 
     def ask(self, token, method, path, body=None, connection=None, **headers):
         """Return the status, the answer and its headers."""

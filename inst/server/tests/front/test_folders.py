@@ -1,6 +1,7 @@
 import os
 import stat
 import subprocess
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -18,9 +19,11 @@ def test_each_user_has_a_folder_that_is_there_again(tmp_path, monkeypatch):
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_a_temporary_folder_stays_only_for_what_was_written(monkeypatch):
+def test_a_temporary_folder_stays_only_for_what_was_written(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     made = Folders(None)
+    assert not list(tmp_path.iterdir())
     folders_of = {name: made.of(name)[0] for name in ("anna", "ben")}
     (folders_of["anna"] / "runs").touch()
     made.close()

@@ -264,7 +264,7 @@ def quick_front(tmp_path_factory):
     (folder / "runs" / "carl").touch()
     front = FrontProcess(
         folder,
-        *("--idle-minutes", "0.02", "--monitor-dir", str(folder / "runs")),
+        *("--idle-minutes", "0.02"),
         limits={"gym_server.front.front._SHOW_SECONDS": 0.5},
         stderr=subprocess.DEVNULL,
     )
