@@ -31,7 +31,8 @@
 #'   \item{linear, epsilon_steps}{If `linear` is `TRUE`, `learning_rate` and `clip` decrease from
 #'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
 #'   `epsilon_steps`.}
-#'   \item{episodes, total_steps, max_steps}{Of the training; `total_steps` is its budget.}
+#'   \item{episodes, eval_every, total_steps, max_steps}{Of the training; `total_steps` is its budget.
+#'   Agents with long iterations are evaluated more often than every ten of them.}
 #'   \item{origin, source, tried}{`origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is
 #'   the number of settings that were tried with seeds 1 to 99 before these were chosen (an
 #'   integer). `vignette("solved")` reports other seeds.}
@@ -145,7 +146,7 @@ make_and_train <- function(make, frame, ...) {
     abort_no_budget(preset_hints(env, kwargs), frame)
   }
   if (!is.null(preset)) {
-    own <- c("episodes", "max_steps", if (!budget) "total_steps")
+    own <- c("episodes", "eval_every", "max_steps", if (!budget) "total_steps")
     from_preset <- setdiff(intersect(own, names(preset)), names(training))
     training[from_preset] <- preset[from_preset]
   }

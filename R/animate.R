@@ -235,7 +235,8 @@ print.gym_animation <- function(x, ...) {
   cat(format(x), "\n", sep = "")
   if (!file.exists(x$file)) {
     x <- redrawn_if_gone(x)
-    cat("  gone; its ", count_of(length(x$stills$steps), "still"), " are in ", x$file, "\n", sep = "")
+    stills <- count_of(length(x$stills$steps), "still")
+    cat("  gone; its ", stills, " are in ", x$file, "\n", sep = "")
   }
   open_address(among_temporary_files(x$file), check_viewer())
   invisible(x)

@@ -49,6 +49,9 @@ score_label <- function(x) if (is.null(x$reference)) "mean return" else "normali
 
 statistic_names <- c(mean = "mean", median = "median", iqm = "interquartile mean")
 
+# Rows whose names fit a third of four inches.
+named_rows <- function() ggplot2::scale_y_discrete(labels = function(at) broken_texts(at, 18))
+
 scores_picture <- function(x) {
   table <- x$table
   table$statistic <- factor(table$statistic, unique(table$statistic))
@@ -61,7 +64,8 @@ scores_picture <- function(x) {
       ggplot2::vars(.data$statistic), ncol = 1L, labeller = ggplot2::as_labeller(statistic_names)
     ) +
     ggplot2::scale_colour_manual(values = named_colours(unique(x$table$training)), guide = "none") +
-    ggplot2::labs(x = score_label(x), y = NULL)
+    named_rows() +
+    picture_labels(x = score_label(x), y = NULL)
 }
 
 # Lines with bands over scores or steps.
@@ -83,7 +87,7 @@ shares_picture <- function(rows, x, geom) {
 
 profile_picture <- function(x) {
   shares_picture(x$profile, "score", ggplot2::geom_step(direction = "hv", linewidth = 0.8)) +
-    ggplot2::labs(x = score_label(x), y = "share of runs that score more")
+    picture_labels(x = score_label(x), y = "share of runs that score more")
 }
 
 improvement_picture <- function(x) {
@@ -99,7 +103,8 @@ improvement_picture <- function(x) {
     ggplot2::geom_vline(xintercept = 0.5, linetype = "dashed", colour = gym_colours[["ink"]]) +
     ggplot2::geom_pointrange(colour = gym_colours[["blue"]]) +
     ggplot2::coord_cartesian(xlim = c(0, 1)) +
-    ggplot2::labs(x = "probability of a higher score", y = NULL)
+    named_rows() +
+    picture_labels(x = "probability of a higher score", y = NULL)
 }
 
 reached_picture <- function(x) {
@@ -125,7 +130,7 @@ reached_picture <- function(x) {
       ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
     }) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
-    ggplot2::labs(x = training_steps_label, y = "share that reached the target")
+    picture_labels(x = training_steps_label, y = "share that reached the target")
 }
 
 match_profile <- function(runs, profile) {

@@ -13,8 +13,8 @@ comparison_picture <- function(rollouts) {
   ) +
     # All rows have the same height.
     ggplot2::geom_density(
-      ggplot2::aes(y = ggplot2::after_stat(.data$scaled)), returns[!returns$few, ], trim = TRUE,
-      alpha = 0.4
+      ggplot2::aes(y = ggplot2::after_stat(.data$scaled)), returns[returns$kind == "density", ],
+      trim = TRUE, alpha = 0.4
     ) +
     lapply(unname(split(returns, returns$env_id)), bars_of_rows) +
     ggplot2::geom_rug(sides = "b", length = ggplot2::unit(0.08, "npc")) +
@@ -25,12 +25,14 @@ comparison_picture <- function(rollouts) {
     (if (one_env) {
       ggplot2::facet_wrap(
         ggplot2::vars(.data$label), ncol = 1L, strip.position = "left",
-        labeller = ggplot2::as_labeller(row_titles(data$rows), ggplot2::label_wrap_gen(30))
+        labeller = ggplot2::as_labeller(function(labels) {
+          broken_texts(row_titles(data$rows)[labels], 24)
+        })
       )
     } else {
       ggplot2::facet_grid(
         ggplot2::vars(.data$label), ggplot2::vars(.data$env_id), scales = "free_x", switch = "y",
-        labeller = ggplot2::label_wrap_gen(30)
+        labeller = wrapped_strips(3)
       )
     }) +
     ggplot2::scale_fill_manual(
@@ -38,7 +40,8 @@ comparison_picture <- function(rollouts) {
       guide = "none"
     ) +
     ggplot2::scale_x_continuous(
-      breaks = (if (one_env && all(returns$few)) bar_marks(returns$value)) %||% ggplot2::waiver()
+      breaks = (if (one_env && all(returns$kind == "bars")) bar_marks(returns$value)) %||%
+        ggplot2::waiver()
     ) +
     ggplot2::scale_y_continuous(breaks = NULL, expand = ggplot2::expansion(c(0.12, 0.03))) +
     picture_labels(data$title, data$subtitle, x = "return of an episode", y = NULL) +
@@ -51,15 +54,23 @@ comparison_picture <- function(rollouts) {
 
 # Bars of one environment.
 bars_of_rows <- function(returns) {
-  few <- returns[returns$few, ]
-  ggplot2::geom_bar(
-    ggplot2::aes(y = ggplot2::after_stat(of_highest(.data$count, .data$PANEL))), few,
-    width = bar_width(few$value, returns$value),
-    # Bars may be wider than the distance between two values, so that they are seen.
-    position = "identity", alpha = 0.4
+  few <- returns[returns$kind == "bars", ]
+  whole <- returns[returns$kind == "histogram", ]
+  height <- ggplot2::aes(y = ggplot2::after_stat(of_highest(.data$count, .data$PANEL)))
+  list(
+    ggplot2::geom_bar(
+      height, few, width = bar_width(few$value, returns$value),
+      # Bars may be wider than the distance between two values, so that they are seen.
+      position = "identity", alpha = 0.4
+    ),
+    if (nrow(whole)) {
+      ggplot2::geom_histogram(
+        height, whole, binwidth = bin_width(whole$value), boundary = max(whole$value) + 0.5,
+        position = "identity", alpha = 0.4
+      )
+    }
   )
 }
-
 of_highest <- function(count, row) count / stats::ave(count, droplevels(row), FUN = max)
 
 row_titles <- function(rows) {
@@ -69,8 +80,8 @@ row_titles <- function(rows) {
 #' Compute the data of a plot of several policies
 #' @param rollouts A list of rollouts with names.
 #' @return A list: `rows`, a data frame with a row for each policy and environment, from the top:
-#'   `label`, `env_id`, `median`; `returns`, a data frame: `label`, `env_id`, `value`, and `few`,
-#'   whether the policy's returns are bars; `title`, `subtitle`.
+#'   `label`, `env_id`, `median`; `returns`, a data frame: `label`, `env_id`, `value`, and `kind`,
+#'   how the policy's returns are drawn; `title`, `subtitle`.
 #' @noRd
 comparison_plot_data <- function(rollouts) {
   each <- Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)
@@ -88,7 +99,7 @@ comparison_plot_data <- function(rollouts) {
     returns = data.frame(
       label = rep(label, lengths(shown)), env_id = rep(env_id, lengths(shown)),
       value = unlist(shown, use.names = FALSE),
-      few = rep(vapply(shown, has_few, NA), lengths(shown))
+      kind = rep(vapply(shown, returns_kind, ""), lengths(shown))
     ),
     title = paste(names(by_env), collapse = ", "),
     subtitle = c(

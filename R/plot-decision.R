@@ -92,7 +92,7 @@ output_map <- function(x, points) {
   reach <- max(abs(points$shown - 0.5), 0.01)
   list(
     points = points, fill = diverging_fill("output", 0.5 + c(-reach, reach)), border = 0.5,
-    regions = region_labels(points, 1 + (points$shown > 0.5), x$actions)
+    regions = region_labels(points, 1 + (points$shown > 0.5), x$actions, x$path, needed = TRUE)
   )
 }
 
@@ -110,13 +110,16 @@ diverging_fill <- function(name, limits) {
 choice_map <- function(x, points) {
   start <- as.integer(sub(":.*", "", x$actions[[1L]]))
   taken <- points$shown - start + 1
-  regions <- region_labels(points, taken, x$actions)
-  points$shown <- factor(x$actions[taken], x$actions)
-  found <- levels(droplevels(points$shown))
+  numbers <- start + seq_along(x$actions) - 1L
+  # Of many actions the key is a scale.
+  few <- length(numbers) <= most_named_actions
+  regions <- if (few) region_labels(points, taken, x$actions, x$path)
+  points$shown <- shown_actions(points$shown, numbers, x$actions)
+  found <- x$actions[sort(unique(taken))]
   list(
     points = points, regions = regions,
-    fill = ggplot2::scale_fill_manual(
-      name = NULL, values = stats::setNames(action_colours(length(x$actions)), x$actions),
+    fill = action_fill(
+      numbers, x$actions, taken = found,
       # If all names are in the regions, a key is not needed.
       guide = if (all(found %in% regions$label)) "none" else rows_of_key(found)
     )
@@ -125,17 +128,62 @@ choice_map <- function(x, points) {
 
 #' Place the names of regions
 #'
-#' A name is at the point of its region that is farthest from other regions, if there is room.
+#' A name is in the middle of the places in its region where it fits and does not cover the path. If
+#' there is none, the path does not count, and if there is still none, there is no name.
 #' @param region The number of each point's region, from 1.
+#' @param path The path of episodes, or `NULL`.
+#' @param needed Whether a region has a name even if it does not fit, because no key has it.
 #' @noRd
-region_labels <- function(points, region, labels) {
+region_labels <- function(points, region, labels, path = NULL, needed = FALSE) {
   x <- unique(points$x)
   y <- unique(points$y)
   region <- matrix(region, length(x))
+  crossed <- path_cells(path, x, y)
   found <- sort(unique(as.vector(region)))
   found <- found[vapply(found, function(i) mean(region == i), 0) > 0.02]
-  at <- do.call(rbind, lapply(found, function(i) region_middle(region == i)))
-  data.frame(x = x[at[, 1L]], y = y[at[, 2L]], label = labels[found])
+  at <- lapply(found, function(i) {
+    inside <- region == i
+    room <- room_for_name(inside & !crossed, labels[[i]])
+    if (!any(room)) room <- room_for_name(inside, labels[[i]])
+    if (any(room)) region_middle(room) else if (needed) region_middle(inside)
+  })
+  there <- lengths(at) > 0L
+  at <- matrix(as.integer(unlist(at)), ncol = 2L, byrow = TRUE)
+  data.frame(x = x[at[, 1L]], y = y[at[, 2L]], label = labels[found[there]])
+}
+
+# The places around which a name fits into an area of points, in a picture of four inches, whose
+# panel is about 3.2 inches wide and 2 inches high.
+room_for_name <- function(inside, label) {
+  reach <- ceiling(dim(inside) * c(0.042 * nchar(label) / 3.2, 0.1 / 2))
+  t(within_reach(t(within_reach(inside, reach[[1L]])), reach[[2L]]))
+}
+
+# The cells of a column that have only `TRUE` this far above and below.
+within_reach <- function(inside, reach) {
+  n <- nrow(inside)
+  outside <- apply(rbind(0, !inside), 2L, cumsum)
+  fits <- seq_len(n) > reach & seq_len(n) <= n - reach
+  at <- which(fits)
+  free <- outside[at + reach + 1L, , drop = FALSE] == outside[at - reach, , drop = FALSE]
+  inside[] <- FALSE
+  inside[at, ] <- free
+  inside
+}
+
+# The points of a map that a path crosses, with the lines between its steps.
+path_cells <- function(path, x, y) {
+  crossed <- matrix(FALSE, length(x), length(y))
+  nearest <- function(values, at) round((values - at[[1L]]) / (at[[2L]] - at[[1L]])) + 1
+  for (way in if (!is.null(path)) split(path, path$episode)) {
+    n <- nrow(way)
+    between <- if (n > 1L) seq(1, n, by = 0.05) else 1
+    part <- function(values) if (n > 1L) stats::approx(seq_len(n), values, between)$y else values
+    cells <- cbind(nearest(part(way$x), x), nearest(part(way$y), y))
+    shown <- cells[, 1L] %in% seq_along(x) & cells[, 2L] %in% seq_along(y)
+    crossed[cells[shown, , drop = FALSE]] <- TRUE
+  }
+  crossed
 }
 
 # Remove border points again and again until none is left. The last ones are in the middle.

@@ -9,10 +9,11 @@
 #' prints it.
 #'
 #' `"returns"` shows the density of the returns, with the median marked, and each episode as a tick
-#' on the axis. Few different returns, such as the 0 and 1 of FrozenLake, have a bar each with the
-#' number of episodes. There are bars for at most 3 values, or for at most 10 that occur twice on
-#' average. In a comparison all rows have the same height. Of more than ten policies, the ten with
-#' the highest mean returns are shown.
+#' on the axis. Returns that are whole numbers have a histogram of episodes, with a bar for each
+#' number if there are at most 40 from the smallest to the largest. Few different returns, such as
+#' the 0 and 1 of FrozenLake, have a bar each. There are such bars for at most 3 values, or for at
+#' most 10 that occur twice on average. In a comparison all rows have the same height. Of more than
+#' ten policies, the ten with the highest mean returns are shown.
 #'
 #' `"trajectory"` shows each part of an episode's observations in a panel, and the actions below
 #' them, against the number of steps. The labels use the units and the meanings of actions in
@@ -40,6 +41,7 @@
 #' @param main The title. `NULL`, the default, names the environment.
 #' @param xlab,ylab The axes' labels, strings. `NULL`, the default, for the picture's own.
 #' @param xlim,ylim The part of the axes to show, two numbers each. `NULL`, the default, for all.
+#' @param guide `"none"` draws the picture without its key. `NULL`, the default, draws it.
 #' @return A ggplot. `plot()` returns it invisibly.
 #' @section Errors: `gym_error_argument` for an invalid argument, or a rollout without the steps or
 #'   frames to be shown.

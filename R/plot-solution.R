@@ -3,10 +3,12 @@
 #' Show the value of each state as a colour (darker is lower) and its best action as an arrow or a
 #' letter. Supported grids are FrozenLake, CliffWalking, Taxi (for one passenger and destination)
 #' and any other grid whose `columns` you give. Marks show goals and pits, where episodes end. Cells
-#' that an episode never enters, such as walls, are empty. Other models have a point for each state.
+#' that an episode never enters, such as walls, are empty. Other models have a point for each state,
+#' with its action; for more than 30 states the actions are in a panel of their own.
 #'
 #' `type = "q"` shows the value of each action. Each cell has a triangle for each direction, with
-#' the best one in bold. Actions that are not directions are left out.
+#' the best one in bold. Actions that are not directions are left out. Without a grid, each action
+#' has a symbol, or more than six actions have a row each, with a dot at the best one.
 #'
 #' If all terminal states give the same reward, they are goals, unless going on gives more.
 #' Otherwise those with the largest reward are goals and the others are pits.
@@ -99,7 +101,7 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   )
   placed$cells$ink <- ink_on(placed$cells$value)
   placed$cells$text <- number_texts(placed$cells$value)
-  c(placed, list(directions = directions))
+  c(placed, list(directions = directions, numbers = numbers))
 }
 
 #' Find the states that episodes go through and those in which they end
@@ -138,13 +140,16 @@ end_kinds <- function(model, kinds) {
 q_of_cells <- function(q, states, data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   q <- q[match(cells$state, states), , drop = FALSE]
+  most <- apply(q, 1L, max)
   each <- data.frame(
     cells[
       rep(seq_len(nrow(cells)), ncol(q)), intersect(c("state", "row", "column"), names(cells)),
       drop = FALSE
     ],
-    direction = rep(data$directions, each = nrow(cells)), q = as.vector(q),
-    best = as.vector(q == apply(q, 1L, max)), row.names = NULL
+    direction = rep(data$directions, each = nrow(cells)),
+    action = rep(data$numbers, each = nrow(cells)), q = as.vector(q),
+    # Equal values may differ by rounding.
+    best = as.vector(q >= most - 1e-9 * pmax(1, abs(most))), row.names = NULL
   )
   each[is.finite(each$q), ]
 }
@@ -236,6 +241,15 @@ value_points <- function(data) {
   cells$kind <- ifelse(cells$end == "", "value", cells$end)
   marks <- c(list(value = key_mark("blue", shape = 16)), end_marks())
   there <- marks[names(marks) %in% cells$kind[!is.na(cells$value)]]
+  cells$panel <- "value"
+  # With more states the names of actions would overlap.
+  crowded <- nrow(cells) > 30L
+  taken <- cells[crowded & !is.na(cells$value) & cells$end == "" & nzchar(cells$does), ]
+  taken$value <- taken$action
+  taken$panel <- rep(action_panel(data), nrow(taken))
+  panels <- unique(c("value", taken$panel))
+  cells$panel <- factor(cells$panel, panels)
+  taken$panel <- factor(taken$panel, panels)
   ggplot2::ggplot(cells, ggplot2::aes(.data$state, .data$value)) +
     lapply(names(there), function(kind) {
       ggplot2::geom_point(
@@ -243,21 +257,46 @@ value_points <- function(data) {
         size = 2.5, na.rm = TRUE
       )
     }) +
-    # With more states the names would overlap.
-    (if (nrow(cells) <= 30L) {
+    (if (!crowded) {
       ggplot2::geom_text(
         ggplot2::aes(label = .data$does), cells[!is.na(cells$value), ], vjust = -0.9, size = 3
       )
     }) +
+    (if (nrow(taken)) {
+      list(
+        ggplot2::geom_point(data = taken, colour = gym_colours[["blue"]], size = 1.5),
+        ggplot2::geom_blank(data = replace(taken[1:2, ], "value", range(data$numbers))),
+        ggplot2::facet_wrap(
+          ggplot2::vars(.data$panel), ncol = 1L, scales = "free_y", labeller = wrapped_strips(1)
+        )
+      )
+    }) +
     key_of_marks(there) +
     ggplot2::scale_x_continuous(breaks = few_breaks) +
-    ggplot2::labs(x = "state", y = "value") +
+    ggplot2::scale_y_continuous(
+      # Actions are whole numbers.
+      breaks = function(limits) {
+        is_action <- nrow(taken) && isTRUE(all.equal(limits, range(data$numbers) + 0))
+        if (is_action) few_breaks(limits) else pretty(limits, 4)
+      },
+      expand = ggplot2::expansion(c(0.05, 0.1))
+    ) +
+    ggplot2::labs(x = "state", y = if (!nrow(taken)) "value") +
     theme_gym()
+}
+
+# The title of the panel of actions, with the names of a few.
+action_panel <- function(data) {
+  named <- length(data$numbers) <= most_named_actions && any(data$directions != data$numbers)
+  paste0("action", if (named) paste0(" (", toString(paste(data$numbers, data$directions)), ")"))
 }
 
 q_points <- function(data) {
   labels <- unique(data$directions)
-  shapes <- stats::setNames(rep_len(c(16L, 17L, 15L, 18L, 1L, 2L), length(labels)), labels)
+  if (length(labels) > most_named_actions) {
+    return(q_of_many(data$q))
+  }
+  shapes <- stats::setNames(c(16L, 17L, 15L, 18L, 1L, 2L)[seq_along(labels)], labels)
   ggplot2::ggplot(data$q, ggplot2::aes(.data$state, .data$q)) +
     ggplot2::geom_point(
       ggplot2::aes(
@@ -271,5 +310,20 @@ q_points <- function(data) {
     ggplot2::scale_shape_manual(name = "action", values = shapes, guide = rows_of_key(labels)) +
     ggplot2::scale_x_continuous(breaks = few_breaks) +
     ggplot2::labs(x = "state", y = "value of the action") +
+    theme_gym()
+}
+
+# Many actions have a row each, in the order of their numbers.
+q_of_many <- function(q) {
+  ggplot2::ggplot(q, ggplot2::aes(.data$state, .data$action)) +
+    ggplot2::geom_tile(ggplot2::aes(fill = .data$q), width = 1, height = 1) +
+    ggplot2::geom_point(
+      ggplot2::aes(colour = "best action"), q[q$best, ], shape = 21, fill = "white", size = 1.2
+    ) +
+    value_fill() +
+    key_of_marks(list(`best action` = key_mark("ink", shape = 21))) +
+    ggplot2::scale_x_continuous(breaks = few_breaks) +
+    ggplot2::scale_y_continuous(breaks = few_breaks) +
+    ggplot2::labs(x = "state", y = "action") +
     theme_gym()
 }

@@ -2,11 +2,12 @@
 #'
 #' Show the action of a policy in each state as a colour and an arrow or a letter. Supported grids
 #' are FrozenLake, CliffWalking, Taxi (for one passenger and destination) and any other grid whose
-#' `columns` you give. Otherwise each state has a point.
+#' `columns` you give. Otherwise each state has a point. States without an action, such as terminal
+#' ones and those that were never visited, are empty (see [decision_map()]). If there are more than
+#' six actions, the colours are a scale of their numbers.
 #'
 #' With `type = "q"` it shows the values of all actions instead, if the policy is a table of values:
-#' a triangle for each direction, as in [plot.gym_solution()]. A state is empty if all its actions
-#' have the same value, as in a state that was never left.
+#' a triangle for each direction, as in [plot.gym_solution()].
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -37,26 +38,39 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   picture <- if (type == "q") {
     if (is.null(data$columns)) q_points(data) else grid_picture(data, q_layers(data))
   } else if (is.null(data$columns)) {
-    ggplot2::ggplot(data$cells, ggplot2::aes(.data$state, .data$does)) +
-      ggplot2::geom_point(colour = gym_colours[["blue"]]) +
-      ggplot2::scale_x_continuous(breaks = few_breaks) +
-      ggplot2::labs(x = "state", y = "action") +
-      theme_gym()
+    action_points(data)
   } else {
-    taken <- levels(droplevels(data$cells$action))
+    cells <- data$cells[!is.na(data$cells$action), ]
+    taken <- intersect(data$labels, data$labels[match(cells$action, data$numbers)])
+    cells$shown <- shown_actions(cells$action, data$numbers, data$labels)
     grid_picture(data, c(
       list(
-        cell_tiles(ggplot2::aes(fill = .data$action)),
-        ggplot2::scale_fill_manual(
-          name = "action", values = data$colours, limits = taken
-        )
+        cell_tiles(ggplot2::aes(fill = .data$shown), cells), cell_tiles(fill = NA),
+        action_fill(data$numbers, data$labels, "action", taken, ggplot2::guide_legend())
       ),
-      action_layers(data, data$cells)
+      action_layers(data, cells)
     ))
   }
   shown <- if (type == "q") "values of actions" else policy_subtitle(object)
   picture +
     picture_labels(object$env_id %||% "Decision map", c(shown, taxi_subtitle(data)), width = 40)
+}
+
+# The action in each state without a grid. Few actions have their names on the axis.
+action_points <- function(data) {
+  cells <- data$cells[!is.na(data$cells$action), ]
+  few <- length(data$numbers) <= most_named_actions
+  names <- ifelse(data$directions == data$numbers, data$labels, data$directions)
+  ggplot2::ggplot(cells, ggplot2::aes(.data$state, .data$action)) +
+    ggplot2::geom_point(colour = gym_colours[["blue"]]) +
+    ggplot2::scale_x_continuous(breaks = few_breaks, limits = range(data$cells$state)) +
+    ggplot2::scale_y_continuous(
+      breaks = if (few) data$numbers else few_breaks,
+      labels = if (few) broken_texts(names, 24) else ggplot2::waiver(),
+      limits = if (few) range(data$numbers)
+    ) +
+    ggplot2::labs(x = "state", y = "action") +
+    theme_gym()
 }
 
 q_of_table <- function(x, data, call = rlang::caller_env()) {
@@ -68,14 +82,13 @@ q_of_table <- function(x, data, call = rlang::caller_env()) {
     )
   }
   q <- x$policy$q
-  differs <- row_max(q) > -row_max(-q)
-  data$cells$value <- ifelse(differs[match(data$cells$state, x$grid$state)], 0, NA)
+  data$cells$value <- ifelse(is.na(data$cells$action), NA, 0)
   q_of_cells(q, x$grid$state, data)
 }
 
 #' Compute the data of a map of states
-#' @return As [solution_plot_data()], with `action`, a factor, instead of values, and `colours`, one
-#'   for each action.
+#' @return As [solution_plot_data()], with `action`, a number or `NA`, instead of values, and the
+#'   `numbers` and `labels` of all actions.
 #' @noRd
 state_map_data <- function(x, columns, directions, passenger, destination,
                            call = rlang::caller_env()) {
@@ -84,14 +97,11 @@ state_map_data <- function(x, columns, directions, passenger, destination,
   known <- known_grid(x$env_id %||% "")
   numbers <- state_numbers(x$action_space)
   directions <- action_directions(directions, known, numbers, call)
-  place <- match(cells$action, numbers)
-  cells$does <- factor(directions[place], unique(directions))
+  cells$does <- directions[match(cells$action, numbers)]
   labels <- action_names(x$env_id, length(numbers), numbers[[1L]])
-  cells$action <- factor(labels[place], labels)
   cells$ink <- "black"
   side <- sqrt(nrow(cells))
   own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
   placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call)
-  colours <- stats::setNames(action_colours(length(labels)), labels)
-  c(placed, list(directions = directions, colours = colours))
+  c(placed, list(directions = directions, numbers = numbers, labels = labels))
 }

@@ -11,8 +11,11 @@ gym_colours <- c(
 # For lines and areas that differ by colour alone.
 series_colours <- unname(gym_colours[c("blue", "gold", "purple", "green", "brown", "sky")])
 
+# More labels than there are colours have colours that are less distinct, but no two the same.
 named_colours <- function(labels) {
-  stats::setNames(rep_len(series_colours, length(labels)), labels)
+  n <- length(labels)
+  enough <- n <= length(series_colours)
+  stats::setNames(if (enough) series_colours[seq_len(n)] else grDevices::hcl.colors(n), labels)
 }
 
 # From low to high, light enough at both ends for black text. The lightness of the ends differs,
@@ -22,7 +25,29 @@ diverging_colours <- c("#EFB549", "#FAF7F0", "#4797C8")
 # For regions and cells with a colour for each action, light enough for black text.
 action_colours <- function(n) {
   light <- c("#F3D98B", "#A2CDE9", "#D9B8EE", "#7FC9B3", "#E3B7A2", "#EDEDED", "#C6D66B")
-  if (n > length(light)) grDevices::hcl.colors(n, "viridis") else light[seq_len(n)]
+  light[seq_len(n)]
+}
+
+# Of more actions than there are colours, or symbols, the numbers are a scale.
+most_named_actions <- 6L
+
+# What the fill of a region or cell is: the name of its action, or of many actions the number.
+shown_actions <- function(actions, numbers, labels) {
+  if (length(numbers) > most_named_actions) {
+    return(actions)
+  }
+  factor(labels[match(actions, numbers)], labels)
+}
+
+# The scale of these values. `taken` are those that the key shows.
+action_fill <- function(numbers, labels, name = NULL, taken = labels, guide = rows_of_key(taken)) {
+  if (length(numbers) > most_named_actions) {
+    return(continuous_fill("action", c("#FBF3C9", "#7FC9B3", "#4797C8"), limits = range(numbers)))
+  }
+  ggplot2::scale_fill_manual(
+    name = name, values = stats::setNames(action_colours(length(labels)), labels), limits = taken,
+    guide = guide
+  )
 }
 
 value_colours <- function() grDevices::hcl.colors(101L, "viridis")
@@ -56,29 +81,49 @@ theme_gym_panels <- function() {
     )
 }
 
-# For pictures without axes: grids, diagrams and frames.
+# For pictures without axes: grids, diagrams and frames. The user may still give the axes labels.
 theme_gym_bare <- function() {
-  theme_gym() +
+  list(
+    ggplot2::labs(x = NULL, y = NULL), theme_gym(),
     ggplot2::theme(
-      panel.grid = ggplot2::element_blank(), axis.text = ggplot2::element_blank(),
-      axis.title = ggplot2::element_blank()
+      panel.grid = ggplot2::element_blank(), axis.text = ggplot2::element_blank()
     )
+  )
 }
 
-# Breaks the text above a picture into lines that fit four inches: ggplot2 cuts off longer ones. If
+# Breaks the text around a picture into lines that fit four inches: ggplot2 cuts off longer ones. If
 # a subtitle does not fit one line, each part gets its own.
 picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, caption = NULL) {
+  axes <- axis_labels(...)
   joined <- paste(subtitle, collapse = ", ")
   lines <- unlist(lapply(if (nchar(joined) > width) subtitle else joined, broken_text, width))
   ggplot2::labs(
     title = broken_text(title, 38),
     subtitle = if (length(lines)) paste(lines, collapse = "\n"),
-    caption = if (length(caption)) paste(strwrap(caption, 1.25 * width), collapse = "\n"), ...
+    caption = if (length(caption)) paste(broken_texts(caption, 1.25 * width), collapse = "\n"),
+    !!!axes
   )
 }
 
+# The labels of axes, in lines that fit: the vertical axis of a small picture is two inches long.
+axis_labels <- function(...) {
+  given <- list(...)
+  widths <- c(x = 44, y = 24)
+  Map(function(text, axis) {
+    if (is.character(text)) broken_text(text, widths[[axis]]) else text
+  }, given, names(given))
+}
+
 broken_text <- function(text, width) {
-  if (length(text) && nzchar(text)) paste(strwrap(text, width), collapse = "\n")
+  if (length(text) && nzchar(text)) paste(broken_texts(text, width), collapse = "\n")
+}
+
+# Lines of this width at most, of each text. Words that are longer, such as ids, are broken, too.
+broken_texts <- function(texts, width) {
+  vapply(strwrap(texts, width, simplify = FALSE), function(lines) {
+    cut <- gsub(paste0("(\\S{", as.integer(width), "})(?=\\S)"), "\\1\n", lines, perl = TRUE)
+    paste(cut, collapse = "\n")
+  }, "", USE.NAMES = FALSE)
 }
 
 policy_subtitle <- function(x) paste("policy:", policy_label(x$policy))
@@ -101,7 +146,7 @@ key_of_marks <- function(marks) {
   each <- function(part) unlist(lapply(marks, function(mark) mark[[part]]))
   list(
     ggplot2::scale_colour_manual(
-      name = NULL, values = each("colour"), limits = names(marks),
+      name = NULL, values = each("colour"), limits = names(marks), labels = key_labels,
       guide = rows_of_key(
         names(marks),
         override.aes = list(shape = unname(each("shape")), linetype = unname(each("line")))
@@ -115,9 +160,18 @@ line_marks <- function(labels) {
   lapply(named_colours(labels), function(colour) list(colour = colour, shape = NA, line = "solid"))
 }
 
+# What is longer than a line of the key is broken.
+key_labels <- function(labels) broken_texts(labels, 46)
+
 # A key with as many rows as fit into four inches.
 rows_of_key <- function(labels, ...) {
-  ggplot2::guide_legend(nrow = ceiling(sum(nchar(labels) + 6) / 54), byrow = TRUE, ...)
+  n <- length(labels)
+  width <- function(rows) {
+    columns <- ceiling(n / rows)
+    sum(tapply(pmin(nchar(labels), 46) + 6, (seq_len(n) - 1L) %% columns, max))
+  }
+  rows <- Find(function(rows) width(rows) <= 54, seq_len(n))
+  ggplot2::guide_legend(nrow = rows %||% max(n, 1L), byrow = TRUE, ...)
 }
 
 # The key of a colour scale, with few numbers so that they do not overlap.
@@ -159,7 +213,9 @@ number_axis <- function(scale, ...) scale(labels = axis_numbers, ...)
 axis_numbers <- function(at) ifelse(is.na(at), NA, number_text(at, trim = TRUE))
 
 # The panels' titles, one line each if they fit half of four inches.
-wrapped_strips <- function(columns = 2) ggplot2::label_wrap_gen(66 %/% columns)
+wrapped_strips <- function(columns = 2) {
+  ggplot2::as_labeller(function(labels) broken_texts(labels, 66 %/% columns))
+}
 
 # Axis marks: all whole numbers if there are few, because actions are whole. `pretty()` may give
 # more than asked for.

@@ -59,17 +59,17 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
       evaluations[evaluations$kind != "final", ], shape = 1, size = 2, stroke = 1
     ) +
     ggplot2::geom_linerange(
-      ggplot2::aes(ymin = .data$lower, ymax = .data$upper, colour = "the policy"), final,
+      ggplot2::aes(ymin = .data$lower, ymax = .data$upper, colour = "final evaluation"), final,
       linewidth = 0.8, show.legend = FALSE, na.rm = TRUE
     ) +
     ggplot2::geom_point(
-      ggplot2::aes(y = .data$mean_return, colour = "the policy"), final, size = 3,
-      show.legend = FALSE
+      ggplot2::aes(y = .data$mean_return, colour = "final evaluation"), final, size = 3
     ) +
     key_of_marks(c(
       stats::setNames(list(key_mark("sky", shape = 15)), range),
       list(`their median` = key_mark("blue", line = "solid")),
-      if (nrow(evaluations)) list(`the policy` = key_mark("brown", shape = 1)),
+      if (nrow(evaluations) > nrow(final)) list(`the policy` = key_mark("brown", shape = 1)),
+      if (nrow(final)) list(`final evaluation` = key_mark("brown", shape = 16)),
       target_mark(target)
     )) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +

@@ -1,7 +1,8 @@
 # plot() of a result prints the picture made by autoplot(). Printing needs ggplot2's namespace,
 # which is loaded by the first picture and not with this package.
 
-show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL) {
+show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL,
+                         guide = NULL) {
   arguments <- arguments_as_written(quote(x))
   # Results are passed as variables that know their names: an argument with a name such as `episode`
   # would be taken for one of autoplot().
@@ -13,9 +14,14 @@ show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = N
   arguments[named] <- lapply(names, as.name)
   names(arguments)[named] <- ""
   picture <- naming_own_call(eval(as.call(c(quote(autoplot), arguments)), results), "autoplot")
-  labels <- list(title = if (!is.null(main)) broken_text(main, 38), x = xlab, y = ylab)
-  given <- c(!is.null(main), !is.null(xlab), !is.null(ylab))
-  picture <- picture + rlang::exec(ggplot2::labs, !!!labels[given])
+  labels <- Filter(Negate(is.null), list(x = xlab, y = ylab))
+  picture <- picture + ggplot2::labs(!!!do.call(axis_labels, labels))
+  if (!is.null(main)) picture <- picture + ggplot2::labs(title = broken_text(main, 38))
+  if (!is.null(guide)) {
+    must <- "\"none\" or NULL"
+    if (!identical(guide, "none")) abort_argument(guide, must, "guide", rlang::current_env())
+    picture <- picture + ggplot2::theme(legend.position = "none")
+  }
   if (!is.null(xlim) || !is.null(ylim)) {
     picture <- picture + ggplot2::coord_cartesian(xlim = xlim, ylim = ylim)
   }

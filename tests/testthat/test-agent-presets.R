@@ -143,3 +143,12 @@ test_that("whoever still writes `steps` is told its new name, before anything is
   expect_error(learn_td("Taxi-v4", policy_random(), steps = 100, client = no_client()),
                "`total_steps`", class = "gym_error_argument")
 })
+
+test_that("a curve by a preset of PPO has a point for most iterations", {
+  skip_unless_all()
+  trained <- suppressMessages(learn_ppo(
+    "CartPole-v1", iterations = 3, target = Inf, eval_episodes = 2, eval_episodes_curve = 2,
+    seed = 1, client = test_client()
+  ))
+  expect_identical(sum(trained$evaluations$kind == "curve"), 4L)
+})

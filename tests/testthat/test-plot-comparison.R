@@ -4,7 +4,7 @@ played_with <- function(returns, policy = policy_random(), ...) {
   rollout(scripted_environment(returns, ...), policy, episodes = length(returns), seed = 1)
 }
 
-many <- c(10, 12, 13, 15, 16, 18, 20, 40)
+many <- c(10, 12.5, 13, 15, 16, 18, 20, 40)
 
 test_that("each rollout has a row from the top, with its name, its median and its colour", {
   picture <- drawn(autoplot(upper = played_with(many), lower = played_with(c(3, 3))))
@@ -29,7 +29,7 @@ test_that("rows show their own returns as densities, or as bars of one width", {
   expect_equal(area$x, whole$x)
   expect_equal(area$y, whole$y / max(whole$y))
   bars <- layers_of(picture, "GeomBar")[[1]]
-  expect_equal(bars$xmax - bars$xmin, rep(4, 3))
+  expect_equal(bars$xmax - bars$xmin, rep(0.9, 3))
   # The higher bar of a row fills it, the other is a third as high.
   expect_equal(bars$y, c(1, 1 / 3, 1))
   marks <- function(picture) {
@@ -38,6 +38,14 @@ test_that("rows show their own returns as densities, or as bars of one width", {
   }
   expect_equal(marks(autoplot(played_with(c(3, 3)), played_with(c(0, 0, 5, 5)))), c(0, 3, 5))
   expect_false(identical(marks(picture), c(0, 5, 40)))
+})
+
+test_that("a row of whole numbers is a histogram", {
+  picture <- drawn(autoplot(a = played_with(c(1:8, 8)), b = played_with(many)))
+  bars <- layers_of(picture, "GeomBar")
+  bars <- bars[[length(bars)]]
+  expect_equal(bars$y[bars$y > 0], c(rep(0.5, 7), 1))
+  expect_equal(unique(round(bars$xmax - bars$xmin, 9)), 1)
 })
 
 test_that("the policies of one rollout have a row each, with their names", {

@@ -39,6 +39,24 @@ test_that("regions have the names of their actions, inside of them, and then no 
   expect_false(identical(choice(-1.5, -0.95), "none"))
 })
 
+test_that("names of regions do not cover the path, and are not cut at the edge", {
+  across <- data.frame(obs_1 = c(-2, 2), obs_2 = 0)
+  picture <- drawn(autoplot(map_of(rising, path = across)))
+  names <- layers_of(picture, "GeomText")[[1]]
+  expect_identical(names$label, c("0", "1"))
+  expect_true(all(abs(names$y) > 0.1))
+  # A long name in a narrow region is in the key.
+  narrow <- region_labels(
+    expand.grid(x = seq(0, 1, length.out = 21), y = seq(0, 1, length.out = 21)),
+    rep(rep(1:2, c(2, 19)), 21), c("a very long name", "b")
+  )
+  expect_identical(narrow$label, "b")
+  room <- room_for_name(matrix(TRUE, 101, 101), strrep("n", 20))
+  half <- 101 * 0.042 * 20 / 3.2
+  expect_gte(min(which(room[, 51])), half)
+  expect_lte(max(which(room[, 51])), 101 - half)
+})
+
 test_that("maps of actions that are numbers or many are drawn, and so are paths", {
   box <- plane(box_space(-2, 2))
   drawn(autoplot(map_of(policy_network(c(2, 1), c("tanh", "tanh")), box)))

@@ -3,7 +3,7 @@ rollout_of <- function(returns) {
 }
 
 test_that("the picture shows the density of the returns, each of them, and their median", {
-  returns <- c(10, 12, 13, 15, 16, 18, 20, 40)
+  returns <- c(10, 12.5, 13, 15, 16, 18, 20, 40)
   picture <- drawn(ggplot2::autoplot(rollout_of(returns)))
   whole <- density(returns, from = 10, to = 40)
   expect_equal(layers_of(picture, "GeomDensity")[[1]][c("x", "y")],
@@ -21,6 +21,25 @@ test_that("few different returns have a bar each, as high as the number of their
   expect_equal(bars$ymax, c(16, 8, 8, 8))
   expect_equal(bars$xmax - bars$xmin, rep(0.4, 4))
   expect_identical(picture$labels$y, "episodes")
+})
+
+test_that("whole numbers are a histogram: a bar for each number, or for as many in a row", {
+  returns <- c(9:20, 20, 31)
+  picture <- drawn(ggplot2::autoplot(rollout_of(returns)))
+  bars <- layers_of(picture, "GeomBar")[[1]]
+  expect_equal(bars$x[bars$count > 0], c(9:20, 31))
+  expect_equal(bars$count[bars$count > 0], c(rep(1, 11), 2, 1))
+  expect_identical(picture$labels$y, "episodes")
+  wide <- layers_of(ggplot2::autoplot(rollout_of(c(returns, 500))), "GeomBar")[[1]]
+  width <- unique(round(wide$xmax - wide$xmin, 6))
+  expect_identical(width, trunc(width))
+  expect_equal(c(max(wide$xmax), sum(wide$count)), c(500.5, 15))
+})
+
+test_that("no bar is wider than what its returns may be", {
+  widths <- vapply(list(200, c(200, 200), 0, c(0, 500)), bar_width, 0)
+  expect_equal(widths, c(0.9, 0.9, 0.9, 5))
+  expect_lt(bar_width(-962.6), 1)
 })
 
 test_that("bars are as few as are twice as many episodes on average, or three", {

@@ -82,6 +82,32 @@ test_that("an end that costs is a pit, alone it is one where going on gives more
   expect_identical(ends(-9, -9, move = 1), c("pit", "", "", "pit"))
 })
 
+test_that("without a grid the actions of many states have a panel, and many actions a row each", {
+  # The gambler of Sutton and Barto (2018), example 4.3: stakes of up to half of the goal.
+  states <- data.frame(state = rep(1:39, pmin(1:39, 39:1)))
+  states$action <- sequence(pmin(1:39, 39:1))
+  bets <- rbind(
+    transform(states, next_state = state + action, probability = 0.4),
+    transform(states, next_state = state - action, probability = 0.6)
+  )
+  bets$reward <- as.numeric(bets$next_state == 40)
+  bets$terminated <- bets$next_state %in% c(0, 40)
+  solved <- solve_mdp(gym_model(bets, start = 1, id = "Gambler"))
+  picture <- drawn(autoplot(solved))
+  panels <- ggplot2::ggplot_build(picture)$layout$layout$panel
+  expect_identical(as.character(panels), c("value", "action"))
+  taken <- layers_of(picture, "GeomPoint")
+  taken <- do.call(rbind, lapply(taken, function(layer) layer[c("x", "y", "PANEL")]))
+  taken <- taken[taken$PANEL == 2, ]
+  expect_identical(taken$y[order(taken$x)], as.numeric(solved$actions[2:40]))
+  q <- drawn(autoplot(solved, type = "q"))
+  expect_gt(nrow(unique(layers_of(q, "GeomTile")[[1]]["y"])), 15)
+  best <- layers_of(q, "GeomPoint")[[1]]
+  expect_true(all(paste(1:39, solved$actions[2:40]) %in% paste(best$x, best$y)))
+  expect_identical(action_panel(list(numbers = 0:1, directions = c("stay", "go"))),
+                   "action (0 stay, 1 go)")
+})
+
 test_that("any solution is drawn, and a wrong grid, direction or step refused", {
   limited <- solve_mdp(walk_model(), horizon = 3)
   expect_match(drawn(autoplot(limited))$labels$subtitle, "best values of states within 3 steps")

@@ -36,6 +36,43 @@ test_that("it is drawn on the known grids and on given ones, and otherwise as po
   expect_error(plot(own, columns = 3), "make whole rows", class = "gym_error_argument")
 })
 
+test_that("states that are never visited, end an episode or cannot be are empty", {
+  client <- test_client()
+  map <- decision_map("FrozenLake-v1", function(state) state %% 4L, client = client)
+  # The holes and the goal of the map SFFF FHFH FFFH HFFG.
+  expect_identical(map$grid$state[is.na(map$grid$action)], c(5L, 7L, 11L, 12L, 15L))
+  expect_output(print(map), "11 of 16 states")
+  picture <- drawn(autoplot(map))
+  expect_identical(nrow(layers_of(picture, "GeomTile")[[1]]), 11L)
+  expect_identical(nrow(do.call(rbind, layers_of(picture, "GeomSegment"))), 11L)
+  learned <- matrix(0, 16, 4)
+  learned[cbind(1:3, 1:3)] <- c(1, 1, -Inf)
+  map <- decision_map(lake_like(), policy_table(learned))
+  expect_identical(map$grid$action, c(0:1, rep(NA, 14)))
+  # The function is not asked about a state that no episode reaches.
+  taxi <- decision_map("Taxi-v4", function(state) {
+    stopifnot(state %/% 4 %% 5 != state %% 4)
+    state %% 4L
+  }, client = client)
+  expect_identical(sum(is.na(taxi$grid$action)), 100L)
+})
+
+test_that("many actions are a scale, on a grid and without one", {
+  env <- lake_like(50L, "Own-v0")
+  map <- decision_map(env, function(state) 3L * state)
+  scale_of <- function(picture, which) {
+    ggplot2::ggplot_build(drawn(picture))$plot$scales$get_scales(which)
+  }
+  expect_identical(scale_of(autoplot(map, columns = 4), "fill")$get_limits(), c(0L, 49L))
+  expect_identical(layers_of(drawn(autoplot(map)), "GeomPoint")[[1]]$y, 3 * (0:15))
+  expect_lte(length(scale_of(autoplot(map), "y")$get_breaks()), 7)
+  q <- outer(0:15, 0:49)
+  points <- autoplot(decision_map(env, policy_table(q + 0.1)), type = "q")
+  expect_s3_class(scale_of(points, "fill"), "ScaleContinuous")
+  expect_identical(unique(layers_of(points, "GeomPoint")[[1]]$y), 49)
+  expect_identical(anyDuplicated(named_colours(1:50)), 0L)
+})
+
 test_that("the values of a learned table are triangles on the grid, or points", {
   map <- function(policy) decision_map(lake_like(2L, "Own-v0"), policy)
   q <- matrix(0, 16, 2)

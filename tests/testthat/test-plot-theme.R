@@ -33,7 +33,6 @@ test_that("what is mapped from low to high is told apart in grey, and text on it
   ends <- lightness(diverging_colours[c(1, 3)])
   expect_gt(abs(diff(ends)), 15)
   expect_gt(min(ends, lightness(action_colours(7))), 55)
-  expect_length(unique(action_colours(18)), 18)
 })
 
 test_that("text above a picture is broken where four inches end, a part a line", {
@@ -61,6 +60,16 @@ test_that("titles and keys fit four inches", {
   }
   expect_fits(labels)
   expect_fits(paste(labels, "and wait"))
+})
+
+test_that("words longer than a line are broken, such as ids, and so are names in keys and rows", {
+  id <- "a-package/AVeryLongNameOfAnEnvironmentWithoutASpace-v0"
+  expect_lte(max(nchar(strsplit(picture_labels(id)$title, "\n")[[1]])), 38)
+  expect_identical(broken_texts(c("one two", "three"), 5), c("one\ntwo", "three"))
+  expect_match(axis_labels(y = "share of runs that score more")$y, "\n")
+  expect_match(key_labels(strrep("long ", 20)), "\n")
+  expect_match(wrapped_strips()(data.frame(a = strrep("x", 50)))[[1]], "\n")
+  expect_match(named_rows()$labels(c("a training with a long name", "b"))[[1]], "\n")
 })
 
 test_that("marks on an axis are whole numbers where some fit", {

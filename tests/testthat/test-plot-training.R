@@ -19,13 +19,17 @@ test_that("the picture shows candidates, median, evaluations, target and final e
   expect_identical(layers_of(picture, "GeomHline")[[1]]$yintercept, 30)
   expect_identical(picture$labels$title, "ARS V2-t in Fake-v0")
   expect_identical(key_of(picture),
-                   c("range of candidates", "their median", "the policy", "target 30"))
+                   c("range of candidates", "their median", "the policy", "final evaluation",
+                     "target 30"))
+  # Hollow and filled circles.
+  guide <- ggplot2::ggplot_build(picture)$plot$scales$get_scales("colour")$guide
+  expect_identical(guide$override.aes$shape[3:4], c(1, 16))
 })
 
 test_that("a learner has no candidates, and no key has a target that is not there", {
   learned <- learn_q(walk_model(), iterations = 20, seed = 1)
   expect_identical(key_of(drawn(autoplot(learned))),
-                   c("range of episodes", "their median", "the policy"))
+                   c("range of episodes", "their median", "the policy", "final evaluation"))
   expect_length(layers_of(autoplot(trained_in_fake(target = Inf)), "GeomHline"), 0)
   by_gradients <- train_agent(agent_reinforce(), fake_environment(), iterations = 2, seed = 1)
   expect_identical(key_of(autoplot(by_gradients))[[1]], "range of episodes")

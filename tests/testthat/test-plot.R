@@ -28,6 +28,28 @@ test_that("titles, labels and limits can be chosen", {
   expect_null(plot(search_of(1:4, rounds = 2), main = "")$labels$title)
 })
 
+test_that("labels of axes work in pictures without axes, and a key can be left out", {
+  local_device()
+  solved <- solve_mdp(walk_model())
+  pictures <- list(
+    plot(solved, columns = 4, xlab = "across", ylab = "down", guide = "none"),
+    plot(policy_network(c(2, 1)), xlab = "across", ylab = "down", guide = "none"),
+    plot(decision_map(policy = policy_network(c(2, 1)), xlim = 0:1, ylim = 0:1),
+         xlab = "across", ylab = "down", guide = "none"),
+    plot(new_frame(array(0:11, c(2, 2, 3))), xlab = "across", ylab = "down", guide = "none")
+  )
+  for (picture in pictures) {
+    grob <- ggplot2::ggplotGrob(picture)
+    drawn <- function(name) class(grob$grobs[[grep(name, grob$layout$name)[[1]]]])[[1]]
+    expect_false("zeroGrob" %in% c(drawn("xlab-b"), drawn("ylab-l")))
+    expect_false(any(grepl("guide-box", grob$layout$name)))
+  }
+  expect_error(plot(solved, guide = "left"), "`guide` must be \"none\" or NULL",
+               class = "gym_error_argument")
+  long <- plot(policy_network(c(2, 1)), ylab = strrep("long ", 10))
+  expect_match(long$labels$y, "\n")
+})
+
 test_that("results are called as in the call, as their variables, or by a label of their own", {
   named <- function(object, ...) {
     names(given_rollouts(arguments_as_written(quote(object))))

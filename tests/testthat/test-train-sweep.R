@@ -73,6 +73,12 @@ test_that("a picture has a panel for each setting", {
   built <- ggplot2::ggplot_build(picture)
   expect_identical(nrow(built$layout$layout), 2L)
   expect_no_match(picture$labels$subtitle, "target")
+  # What all settings share is not repeated.
+  expect_match(picture$labels$subtitle, "candidates = 2")
+  expect_identical(unname(varied_settings(names(sweep_fake()$trainings))$each),
+                   c("noise = 0.1", "noise = 1"))
+  expect_identical(varied_settings("noise = 1"),
+                   list(constant = NULL, each = c(`noise = 1` = "noise = 1")))
   stopping <- sweep_agent(
     agent_hill_climb, fake_environment(), data.frame(noise = 1:2), seeds = 1:5, iterations = 1,
     eval_episodes = 2, target = 100

@@ -118,10 +118,12 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
   bounds <- c(observed$low[[axis]], observed$high[[axis]])
   if (!is.null(usual)) {
     range(-usual, usual, along)
+  } else if (length(along) && diff(range(along)) > 0) {
+    # Bounds may be far beyond what is ever visited, as in LunarLander.
+    wider <- range(along) + c(-0.05, 0.05) * diff(range(along))
+    c(max(bounds[[1L]], wider[[1L]]), min(bounds[[2L]], wider[[2L]]))
   } else if (all(abs(bounds) < 1e6)) {
     bounds
-  } else if (length(along) && diff(range(along)) > 0) {
-    range(along) + c(-0.05, 0.05) * diff(range(along))
   } else {
     gym_abort(
       c(paste0("The range of ", name, " is unknown, because it has no bounds."),

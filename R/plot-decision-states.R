@@ -11,15 +11,49 @@ check_discrete_actions <- function(place, call) {
   }
 }
 
-new_state_map <- function(place, call) {
+# The states in which an episode may choose an action, a logical vector; `NULL` without a model.
+states_in_play <- function(env, client) {
+  none <- function(cnd) NULL
+  model <- tryCatch(
+    if (!is.null(env)) env_model(env, client = client),
+    gym_error_no_model = none, gym_error_http_400 = none
+  )
+  if (!is.null(model)) state_kinds(model)$reached
+}
+
+# Whether a policy has an action in some rows of its table: one is valid, and not all valid ones
+# have the same value, as in states that were never visited. Other policies always have one.
+has_action <- function(policy, rows) {
+  if (!inherits(policy, "gym_policy_table")) {
+    return(rep(TRUE, length(rows)))
+  }
+  q <- policy$q[rows, , drop = FALSE]
+  valid <- rowSums(q > -Inf)
+  valid == 1 | rowSums(q == row_max(q)) < valid
+}
+
+# The actions in some of the states, `NA` in the others. `batch_at` gives the observations of rows.
+actions_where <- function(some, policy, batch_at, place) {
+  rows <- which(some)
+  actions <- rep(NA_integer_, length(some))
+  if (length(rows)) {
+    chosen <- keep_random_state(act_batch(policy, batch_at(rows), length(rows), place))
+    actions[rows] <- as.integer(chosen)
+  }
+  actions
+}
+
+new_state_map <- function(place, in_play, call) {
   space <- place$observation_space
   states <- state_numbers(space)
   place$call <- call
-  policy <- greedy_policy(place$policy)
-  actions <- keep_random_state(act_batch(policy, states, length(states), place))
+  actions <- actions_where(
+    (in_play %||% TRUE) & has_action(place$policy, seq_along(states)),
+    greedy_policy(place$policy), function(rows) states[rows], place
+  )
   structure(
     list(
-      grid = data.frame(state = states, action = as.integer(actions)), x = "state", kind = "state",
+      grid = data.frame(state = states, action = actions), x = "state", kind = "state",
       action_space = place$action_space, env_id = place$env_id, policy = place$policy
     ),
     class = c("gym_state_map", "gym_decision_map")
@@ -53,12 +87,14 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   grid <- grid[shown, , drop = FALSE]
   row.names(grid) <- NULL
   place$call <- call
-  n <- nrow(grid)
-  states <- named_batch(space, values_batch(space, grid))
-  grid$action <- as.integer(keep_random_state(act_batch(place$policy, states, n, place)))
+  parts <- grid
+  rows <- space_index(space)$index(values_batch(space, parts), nrow(parts))
+  grid$action <- actions_where(
+    has_action(place$policy, rows), place$policy,
+    function(rows) named_batch(space, values_batch(space, parts[rows, , drop = FALSE])), place
+  )
   if (inherits(place$policy, "gym_policy_table")) {
-    row <- space_index(space)$index(states, n)
-    grid$value <- row_max(place$policy$q)[row]
+    grid$value <- row_max(place$policy$q)[rows]
   }
   structure(
     list(

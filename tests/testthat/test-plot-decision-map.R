@@ -120,13 +120,16 @@ test_that("other parts are held at 0, or in the middle where 0 is out of bounds"
   expect_identical(decision_map(env, policy_network(), 1, 4)$at, c(obs_2 = 3, obs_3 = 0))
 })
 
-test_that("ranges are given, usual, the bounds, or those of the path", {
+test_that("ranges are given, usual, those of the path, or the bounds", {
   ends <- function(map) unname(unlist(lapply(map$grid[1:2], range)))
   expect_equal(ends(pole_map()), c(c(-1, 1) * 12 * pi / 180, -2.5, 2.5))
   expect_equal(ends(pole_map(xlim = c(0, 1))), c(0, 1, -2.5, 2.5))
   env <- fake_environment(observation_space = box_space(c(-5, -Inf, -1, -1), c(7, Inf, 1, 1)))
   path <- data.frame(obs_1 = c(1, 2), obs_2 = c(10, 30))
-  expect_equal(ends(decision_map(env, policy_network(), 1, 2, path = path)), c(-5, 7, 9, 31))
+  expect_equal(ends(decision_map(env, policy_network(), 1, 2, path = path)), c(0.95, 2.05, 9, 31))
+  # Not beyond the bounds, and those where the path does not move.
+  edge <- data.frame(obs_1 = c(-5, 5), obs_3 = 0)
+  expect_equal(ends(decision_map(env, policy_network(), 1, 3, path = edge)), c(-5, 5.5, -1, 1))
   expect_error(decision_map(env, policy_network(), 1, 2), "range of obs_2 is unknown",
                class = "gym_error_argument")
   beyond <- data.frame(pole_angle = c(0, 1), pole_angular_velocity = c(0, 1))
@@ -222,11 +225,11 @@ test_that("several parts with few values each have a map, of a table with its va
     reset = function(self) list(a = 5L, b = 0L, c = 0L), step = function(self, action) NULL,
     observation_space = parts, action_space = space_discrete(2)
   )
-  policy <- policy_table(cbind(1:12, 7))
+  policy <- policy_table(cbind(1:12, 7.5))
   map <- decision_map(env, policy)
   expect_identical(map[c("x", "y", "panels")], list(x = "a", y = "b", panels = "c"))
-  expect_identical(map$grid$action, rep(1:0, c(6, 6)))
-  expect_identical(map$grid$value, pmax(1:12, 7))
+  expect_identical(map$grid$action, rep(1:0, c(7, 5)))
+  expect_identical(map$grid$value, pmax(1:12, 7.5))
   asks <- decision_map(env, function(observation) as.integer(observation[[1]] == 6), "c", "a",
                        at = c(b = 1), ylim = c(6, 7))
   expect_identical(asks$panels, character())

@@ -15,6 +15,9 @@
 #'
 #' For Discrete observations the map has the action in each state, and the other arguments are
 #' ignored. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake, CliffWalking or Taxi.
+#' The action is `NA` where there is none: in states in which, by the environment's model (see
+#' [env_model()]), no episode chooses an action, and where all values of a table are equal, as in
+#' states that were never visited.
 #'
 #' If observations have several parts with few values each, like Blackjack's, the map has the action
 #' in each state, and its value if the policy is a table. `x` and `y` are the first two parts by
@@ -25,7 +28,8 @@
 #'
 #' `xlim` and `ylim` set the ranges. By default, CartPole's positions have the range in which an
 #' episode goes on, and its velocities the range of balanced and falling poles. Other parts have
-#' their bounds in the observation space. Parts without bounds need a path, whose range is used.
+#' the range of the path. Without a path they have their bounds in the observation space; parts
+#' without bounds need one.
 #'
 #' @param env The environment, which supplies the names of observations and the meanings of actions:
 #'   an id, such as `"CartPole-v1"`, the result of [gym_wrap()], or an environment made by
@@ -106,7 +110,7 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   place <- mapped_place(env, policy, client)
   if (inherits(place$observation_space, "gym_space_discrete")) {
     check_discrete_actions(place, rlang::current_env())
-    return(new_state_map(place, rlang::current_env()))
+    return(new_state_map(place, states_in_play(env, client), rlang::current_env()))
   }
   if (is_counted_parts(place$observation_space)) {
     check_discrete_actions(place, rlang::current_env())
@@ -263,7 +267,9 @@ as.data.frame.gym_decision_map <- function(x, row.names = NULL, optional = FALSE
 #' @export
 print.gym_decision_map <- function(x, ...) {
   size <- sqrt(nrow(x$grid))
-  states <- count_of(nrow(x$grid), "state")
+  decided <- sum(!is.na(x$grid$action))
+  of_all <- if (decided < nrow(x$grid)) paste(decided, "of ")
+  states <- paste0(of_all, count_of(nrow(x$grid), "state"))
   shows <- switch(
     x$kind,
     state = paste("the action in", states),
