@@ -83,7 +83,7 @@ test_that("each environment has a column, with axis and bars of its own", {
   expect_identical(anyDuplicated(panels$SCALE_X[panels$label == "random"]), 0L)
   bars <- layers_of(picture, "GeomBar")
   expect_equal(bars[[1]]$xmax - bars[[1]]$xmin, c(0.8, 0.8))
-  expect_equal(bars[[2]]$xmax - bars[[2]]$xmin, c(160, 160))
+  expect_equal(bars[[2]]$xmax - bars[[2]]$xmin, c(2, 2))
   expect_setequal(layers_of(picture, "GeomVline")[[1]]$xintercept, c(15.5, -300, 3))
 })
 
