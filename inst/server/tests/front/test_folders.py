@@ -1,4 +1,5 @@
 import os
+import shutil
 import stat
 import subprocess
 import tempfile
@@ -55,8 +56,10 @@ def test_each_folder_has_an_owner_of_its_own_and_keeps_it(tmp_path, monkeypatch)
 def test_each_server_runs_under_the_account_of_its_folder(tmp_path):
     if not folders._can_serve(61184):
         pytest.skip("other accounts cannot run this Python")
-    tmp_path.chmod(0o711)
-    front = FrontProcess(tmp_path, "--allow-module", "faulty_envs", stderr=subprocess.DEVNULL)
+    # Other accounts do not reach pytest's folders.
+    runs = tempfile.mkdtemp(prefix="gym-test-")
+    options = ("--allow-module", "faulty_envs", "--monitor-dir", runs)
+    front = FrontProcess(tmp_path, *options, stderr=subprocess.DEVNULL)
     try:
         pids = {name: front.pid_of(name) for name in ("anna", "ben")}
         uids = {name: Path(f"/proc/{pid}").stat().st_uid for name, pid in pids.items()}
@@ -73,3 +76,4 @@ def test_each_server_runs_under_the_account_of_its_folder(tmp_path):
     finally:
         assert front.stop()[0] == 0
         front.kill()
+        shutil.rmtree(runs)
