@@ -33,7 +33,7 @@ test_that("predicting finds the observations among the columns of played steps",
   expect_identical(predict(search, played$steps), played$steps$action)
   expect_identical(predict(played, rev(played$steps)), played$steps$action)
   expect_identical(predict(search, unname(played$steps[3:6])), played$steps$action)
-  expect_error(predict(search, played$steps[1:5]), "no column `pole_angular_velocity`",
+  expect_error(predict(search, played$steps[1:5]), "it has no `pole_angular_velocity`",
                class = "gym_error_argument")
   random <- rollout(env, policy_random(), steps = TRUE)
   expect_error(predict(random, random$steps), "needs the policy to be a network",
