@@ -31,8 +31,8 @@
 #'   \item{linear, epsilon_steps}{If `linear` is `TRUE`, `learning_rate` and `clip` decrease from
 #'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
 #'   `epsilon_steps`.}
-#'   \item{episodes, eval_every, total_steps, max_steps}{Of the training; `total_steps` is its budget.
-#'   Agents with long iterations are evaluated more often than every ten of them.}
+#'   \item{episodes, eval_every, total_steps, max_steps}{Of the training; `total_steps` is its
+#'   budget. Agents with long iterations are evaluated more often than every ten of them.}
 #'   \item{origin, source, tried}{`origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is
 #'   the number of settings that were tried with seeds 1 to 99 before these were chosen (an
 #'   integer). `vignette("solved")` reports other seeds.}
