@@ -244,6 +244,7 @@ value_points <- function(data) {
   cells$panel <- "value"
   # With more states the names of actions would overlap.
   crowded <- nrow(cells) > 30L
+  room <- c(-0.05, 0.1)
   taken <- cells[crowded & !is.na(cells$value) & cells$end == "" & nzchar(cells$does), ]
   taken$value <- taken$action
   taken$panel <- rep(action_panel(data), nrow(taken))
@@ -276,10 +277,11 @@ value_points <- function(data) {
     ggplot2::scale_y_continuous(
       # Actions are whole numbers.
       breaks = function(limits) {
-        is_action <- nrow(taken) && isTRUE(all.equal(limits, range(data$numbers) + 0))
+        ends <- range(data$numbers)
+        is_action <- nrow(taken) && isTRUE(all.equal(limits, ends + room * diff(ends)))
         if (is_action) few_breaks(limits) else pretty(limits, 4)
       },
-      expand = ggplot2::expansion(c(0.05, 0.1))
+      expand = ggplot2::expansion(abs(room))
     ) +
     ggplot2::labs(x = "state", y = if (!nrow(taken)) "value") +
     theme_gym()

@@ -104,6 +104,14 @@ test_that("without a grid the actions of many states have a panel, and many acti
   expect_gt(nrow(unique(layers_of(q, "GeomTile")[[1]]["y"])), 15)
   best <- layers_of(q, "GeomPoint")[[1]]
   expect_true(all(paste(1:39, solved$actions[2:40]) %in% paste(best$x, best$y)))
+  # Actions are whole numbers, and so are their marks.
+  walk <- data.frame(
+    state = rep(1:40, each = 2), action = 0:1, next_state = as.vector(rbind(0:39, 2:41)),
+    reward = rep(c(0, 1), c(79, 1))
+  )
+  walk <- solve_mdp(gym_model(walk, start = 3, id = "Walk"))
+  marks <- ggplot2::ggplot_build(drawn(autoplot(walk)))$layout$panel_params[[2]]$y$breaks
+  expect_equal(marks[!is.na(marks)], 0:1)
   expect_identical(action_panel(list(numbers = 0:1, directions = c("stay", "go"))),
                    "action (0 stay, 1 go)")
 })
