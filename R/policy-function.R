@@ -96,13 +96,15 @@ observations_hint <- function(space) {
     "It is asked about many observations at once: `observation` is a vector of them."
   } else if (length(space$shape) == 1L && !is.null(space$names)) {
     name <- space$names[[min(3L, length(space$names))]]
-    paste0("It is asked about many observations at once, each a row of a matrix: the ", name,
-           " of each is `observation[, \"", name, "\"]`.")
+    paste0("It is asked about many observations at once, each a row of a matrix with the columns ",
+           few_names(space$names), ": the ", name, " of each is `observation[, \"", name, "\"]`.")
   } else if (is.null(space) || length(space$shape) == 1L) {
     paste("It is asked about many observations at once, each a row of a matrix: the third",
           "number of each is `observation[, 3]`.")
   } else if (has_parts(space)) {
-    "It is asked about many observations at once, whose parts have a row for each of them."
+    names <- space$names %||% names(space$spaces)
+    paste0("It is asked about many observations at once, whose parts",
+           if (length(names)) paste0(", ", few_names(names), ","), " have a row for each of them.")
   } else {
     "It is asked about many observations at once: the first dimension counts them."
   }

@@ -89,11 +89,8 @@ abort_no_action <- function(policy, predicted, call) {
   missing <- is.na(predicted) && !is.nan(predicted)
   actions <- if (!inherits(space, "gym_space_discrete")) {
     "The numbers of an action must be finite"
-  } else if (space$n <= 8L) {
-    names <- action_names(policy$env_id, space$n, space$start)
-    paste("The actions are", paste(names, collapse = ", "))
   } else {
-    paste("The actions are from", space$start, "to", space$start + space$n - 1L)
+    actions_text(policy$env_id, space)
   }
   abort_prediction(
     policy,

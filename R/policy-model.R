@@ -39,6 +39,9 @@
 #'   `observation_space`, `action_space` and `env_id` (`NULL` until it is played).
 #' @section Errors: `gym_error_argument` if there is no method for `predict()`, or, while it is
 #'   played, if `predict()` fails or its result is not an action.
+#' @section Warnings: `gym_warning_response`, once a session for each formula, if a model was
+#'   fitted to numbers that are no actions, such as the codes of a factor, or is a regression on
+#'   more than two actions.
 #' @export
 #' @examples
 #' # A model of any kind that predicts: here one that was fitted to made-up data.
@@ -188,31 +191,11 @@ policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()
     )
   }
   load_model_package(policy, call)
-  if (inherits(actions, "gym_space_discrete")) check_labels(policy, actions, env$spec$id, call)
+  if (inherits(actions, "gym_space_discrete")) check_response(policy, actions, env$spec$id, call)
   policy$observation_space <- env$observation_space
   policy$action_space <- actions
   policy["env_id"] <- list(env$spec$id)
   policy
-}
-
-# The levels of a binomial model's factor must be actions: their numbers or their names.
-check_labels <- function(policy, space, env_id, call) {
-  numbers <- as.character(state_numbers(space))
-  strange <- setdiff(policy$labels, c(numbers, action_meaning(env_id, space$n)))
-  if (length(strange)) {
-    gym_abort(
-      c(paste0("The levels of the model's response, ", quoted_names(policy$labels),
-               ", must be actions; ", quoted_names(strange), if (length(strange) > 1L) {
-                 " are none."
-               } else {
-                 " is none."
-               }),
-        i = paste0("The actions are ", paste(action_names(env_id, space$n, space$start),
-                                             collapse = ", "), "."),
-        i = "`glm(factor(action) ~ ..., binomial)` is fitted to their numbers."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
-    )
-  }
 }
 
 # A policy that was read from a file does not load the package.

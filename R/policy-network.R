@@ -6,7 +6,7 @@
 #' # From outputs to an action
 #'
 #' The meaning of the outputs depends on the environment's action space. The policy gets it from
-#' [rollout()] or [search_random()]; before that it assumes the actions 0, 1, ...
+#' [rollout()], [search_random()] or [policy_bind()]; before that it assumes the actions 0, 1, ...
 #'
 #' - One output and two actions: the output, scaled to the range from 0 to 1, is rounded, as in the
 #'   tutorial *Artificial Intelligence in R (I)* (2018). Exactly one half selects the first action,
@@ -231,9 +231,8 @@ check_sizes <- function(sizes, call = rlang::caller_env()) {
 act.gym_policy_network <- function(policy, observation, draw = TRUE, ...) {
   check_network(policy)
   check_flag(draw)
-  if (!draw) policy <- greedy_policy(policy)
   call <- rlang::current_env()
-  rows_action(policy, network_rows(policy, observation, "observation", call), call)
+  rows_action(policy, network_rows(policy, observation, "observation", call), draw, call)
 }
 
 # Observations given by hand, as observation_rows() returns them, and the actions for them.
@@ -241,9 +240,24 @@ network_rows <- function(policy, observation, arg, call) {
   observation_rows(observation, policy$observation_space, policy$sizes[[1L]], arg, call)
 }
 
-rows_action <- function(policy, rows, call) {
+rows_action <- function(policy, rows, draw, call) {
+  if (is.null(policy$action_space)) inform_unbound(policy)
+  if (!draw) policy <- greedy_policy(policy)
   outputs <- network_outputs(policy, rows$values, call)
   network_action(policy$action_space, outputs, policy, rows$one)
+}
+
+# Without a Box its outputs choose one of several actions. Those of "logistic", the default, are for
+# that; others may be meant as the numbers of a Box.
+inform_unbound <- function(policy) {
+  if (policy$output %in% c("greedy", NA) && output_activation(policy) != "logistic") {
+    last <- max(policy$sizes[[length(policy$sizes)]], 2L) - 1L
+    rlang::inform(
+      c(paste0("The network knows no environment and takes actions from 0 to ", last, "."),
+        i = "`policy_bind(policy, env)` gives it those of `env`, such as the numbers of a Box."),
+      class = "gym_message_unbound", .frequency = "once", .frequency_id = "gym_unbound"
+    )
+  }
 }
 
 #' @exportS3Method

@@ -32,7 +32,7 @@ predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlan
   check_network(policy, call)
   rows <- network_rows(policy, newdata, "newdata", call)
   if (type == "action") {
-    return(rows_action(greedy_policy(policy), rows, call))
+    return(rows_action(policy, rows, draw = FALSE, call))
   }
   outputs <- network_outputs(policy, rows$values, call)
   if (type == "probability") {

@@ -164,6 +164,19 @@ test_that("the hint for a function of a single observation names a part that the
   expect_match(hint("Other-v0", 4), "`observation[, 3]`", fixed = TRUE)
 })
 
+test_that("the hint for a function that misspells a name lists the names", {
+  hint <- function(policy, ...) {
+    env <- fake_vector_env(3, ...)
+    conditionMessage(expect_error(rollout(env, policy, 3), class = "gym_error_argument"))
+  }
+  expect_match(
+    hint(function(observation) observation[, "pole_angl"] > 0, id = "CartPole-v1"),
+    "`cart_position`, `cart_velocity`, `pole_angle`, `pole_angular_velocity`", fixed = TRUE
+  )
+  parts <- space_dict(near = discrete_space(2L), far = discrete_space(2L))
+  expect_match(observations_hint(parts), "`near`, `far`", fixed = TRUE)
+})
+
 test_that("if () for many observations is told how to decide for each", {
   skip_if(getRversion() < "4.2", "if () takes the first of several")
   one <- function(observation) if (observation[, 3] > 0) 1 else 0

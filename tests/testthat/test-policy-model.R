@@ -30,6 +30,15 @@ expect_follows <- function(policy) {
   expect_identical(act(policy, leaning[1, , drop = FALSE]), 1L)
 }
 
+# The warning when a model is bound, or NULL.
+warned_of <- function(...) {
+  withr::local_options(rlib_warning_verbosity = "verbose")
+  tryCatch({
+    bound(...)
+    NULL
+  }, warning = identity)
+}
+
 # A model whose predict() gives what it is told to.
 predicting <- function(value) structure(list(value = value), class = "told")
 predict.told <- function(object, newdata, ...) {
@@ -270,6 +279,48 @@ test_that("levels that are no actions are refused before the first step, with th
                       "`left`, `right`, must be actions; `left`, `right` are none",
                       class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "0: push left, 1: push right", fixed = TRUE)
+})
+
+test_that("numbers that are no actions, as a factor's codes, are warned of once, with the fix", {
+  steps <- made_up_steps()
+  steps$push <- factor(c("push left", "push right")[steps$action + 1L])
+  codes <- list(
+    suppressWarnings(lm(push ~ pole_angle, steps)),
+    lm(as.integer(push) ~ pole_angle, steps),
+    glm(as.integer(push) ~ pole_angle, gaussian, steps)
+  )
+  for (fit in codes) {
+    cnd <- warned_of(fit)
+    expect_match(conditionMessage(cnd), "was fitted to 2, which is no action of <Discrete 2>")
+    expect_match(conditionMessage(cnd), "`glm(factor(action) ~ ..., binomial)`", fixed = TRUE)
+  }
+  expect_null(warned_of(codes[[1]], discrete_space(2L, start = 1L)))
+  for (fit in list(lm(action ~ pole_angle, steps), lm(action == 1 ~ pole_angle, steps),
+                   glm(push ~ pole_angle, binomial, steps), lm(0.6 * action ~ pole_angle, steps),
+                   lm(cbind(push, push) ~ pole_angle, steps))) {
+    expect_null(warned_of(fit))
+  }
+  expect_null(warned_of(codes[[2]], box_space(-2, 2)))
+  withr::local_options(rlib_warning_verbosity = "default")
+  rlang::reset_warning_verbosity(paste("gym_response", format(as_policy(codes[[2]]))))
+  expect_warning(bound(codes[[2]]), class = "gym_warning_response")
+  expect_no_warning(bound(codes[[2]]))
+})
+
+test_that("a regression on more than two actions is told of the models that choose", {
+  steps <- made_up_steps()
+  steps$action <- rep_len(0:2, 200)
+  three <- discrete_space(3L)
+  cnd <- warned_of(lm(action ~ pole_angle, steps), three)
+  expect_match(conditionMessage(cnd), "`rpart::rpart(factor(action) ~ ...)`", fixed = TRUE)
+  skip_if_not_installed("rpart")
+  expect_s3_class(warned_of(rpart::rpart(action ~ pole_angle, steps), three),
+                  "gym_warning_response")
+  expect_null(warned_of(rpart::rpart(factor(action) ~ pole_angle, steps), three))
+  skip_if_not_installed("nnet")
+  numbers <- nnet::nnet(action ~ pole_angle, steps, size = 1, linout = TRUE, trace = FALSE)
+  expect_s3_class(warned_of(numbers, three), "gym_warning_response")
+  expect_null(warned_of(nnet::multinom(factor(action) ~ pole_angle, steps, trace = FALSE), three))
 })
 
 test_that("a prediction that is a list of several things names how to take the actions", {

@@ -219,6 +219,30 @@ test_that("an observation of the wrong length or type is refused with both numbe
                class = "gym_error_argument")
 })
 
+test_that("a network that may act in a Box says once that it takes actions from 0", {
+  withr::local_options(rlib_message_verbosity = "verbose")
+  unbound <- policy_network(c(1, 3, 1), c("tanh", "tanh"))
+  message <- expect_message(expect_true(act(unbound, 0) %in% 0:1), "`policy_bind(policy, env)`",
+                            fixed = TRUE, class = "gym_message_unbound")
+  expect_match(conditionMessage(message), "takes actions from 0 to 1.", fixed = TRUE)
+  expect_message(predict(policy_network(c(1, 3), "identity"), 0), "from 0 to 2",
+                 class = "gym_message_unbound")
+  expect_no_message({
+    predict(unbound, 0, type = "output")
+    act(policy_network(c(1, 1)), 0)
+    for (output in c("softmax", "gaussian", "epsilon-greedy")) {
+      predict(policy_network(c(1, 2), output = output), 0)
+      act(policy_network(c(1, 2), output = output), 0, draw = FALSE)
+    }
+    act(policy_bind(unbound, list(observation_space = box_space(-1, 1),
+                                  action_space = box_space(-2, 2))), 0)
+  })
+  withr::local_options(rlib_message_verbosity = "default")
+  rlang::reset_message_verbosity("gym_unbound")
+  expect_message(act(unbound, 0), class = "gym_message_unbound")
+  expect_no_message(act(unbound, 0))
+})
+
 test_that("another draw changes the weights and nothing else", {
   set.seed(1)
   policy <- policy_bind(policy_network(), fake_environment())

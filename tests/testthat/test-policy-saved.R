@@ -8,14 +8,14 @@ policies_to_save <- function() {
     drawing = policy_network(c(16, 4), output = "softmax"),
     random = policy_random(),
     table = function(observation) max.col(table[observation + 1L, , drop = FALSE], "first"),
-    glm = as_policy(glm(action ~ position, gaussian, steps)),
+    glm = as_policy(glm(factor(action) ~ position, binomial, steps)),
     candidates = policy_candidates(network, rbind(coef(network), -coef(network))),
     list = list(network, policy_random()),
     tree = if (requireNamespace("rpart", quietly = TRUE)) {
       as_policy(rpart::rpart(factor(action) ~ position, steps, minsplit = 2))
     },
     nnet = if (requireNamespace("nnet", quietly = TRUE)) {
-      as_policy(nnet::nnet(action ~ position, steps, size = 1, linout = TRUE, trace = FALSE))
+      as_policy(nnet::nnet(factor(action) ~ position, steps, size = 1, trace = FALSE))
     }
   )
 }
