@@ -68,6 +68,7 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
                           episodes = 5, target = NULL, max_steps = NULL, seeds = 1:100,
                           progress = rlang::is_interactive(), client = gym_client()) {
   check_count(rounds)
+  unchosen <- if (missing(env)) "gym_warning_gymnasium" else character()
   rounds <- as.integer(rounds)
   keep_random_state(force(policy))
   given <- list(
@@ -75,7 +76,7 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
     episodes = as.integer(episodes),
     max_steps = max_steps
   )
-  trained <- withCallingHandlers(
+  trained <- suppressWarnings(classes = unchosen, withCallingHandlers(
     naming_own_call(
       train_agent(
         agent_random(), env, policy, iterations = rounds, episodes = episodes, target = target,
@@ -90,7 +91,7 @@ search_repeat <- function(env = "CartPole-v0", policy = policy_network(), rounds
         rlang::cnd_signal(cnd)
       }
     }
-  )
+  ))
   new_searches(trained, given)
 }
 

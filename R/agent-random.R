@@ -152,14 +152,16 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
                           progress = rlang::is_interactive(), client = gym_client(),
                           checkpoint = NULL, resume = TRUE) {
   check_count(rounds)
+  unchosen <- if (missing(env)) "gym_warning_gymnasium" else character()
   # A new network draws weights; that must not change the search.
   keep_random_state(force(policy))
-  naming_own_call(
+  # Who takes the tutorial's environment by default is not told that its version is out of date.
+  suppressWarnings(classes = unchosen, naming_own_call(
     train_agent(
       agent_random(), env, policy, iterations = as.integer(rounds), episodes = episodes,
       target = target, max_steps = max_steps, seed = seed, solved_by = "candidate",
       checkpoint = checkpoint, resume = resume, progress = progress, client = client
     ),
     "train_agent"
-  )
+  ))
 }

@@ -69,7 +69,7 @@ ask_description <- function(client, env_id, arguments, call) {
       if (!isTRUE(cnd$code %in% c("not_supported", "too_many_processes"))) rlang::cnd_signal(cnd)
     }
   )
-  warn_as_gymnasium(answer, call)
+  warn_as_gymnasium(answer)
   if (!is.null(answer) && !length(answer$remembers)) {
     described_env(client, answer, fields, wrappers, arguments)
   }

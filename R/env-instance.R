@@ -43,7 +43,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   if (identical(render_mode, "human")) {
     watch_once(known_instance(client, instance_id, call), call)
   }
-  warn_as_gymnasium(answer, call)
+  warn_as_gymnasium(answer)
   ready <- TRUE
   instance_id
 }
@@ -174,11 +174,11 @@ read_spec <- function(env_id, spec) {
 texts_of <- function(json) lapply(Filter(rlang::is_string, as.list(json)), shown_line)
 
 # Gymnasium's warnings about an environment that the server made.
-warn_as_gymnasium <- function(answer, call) {
+warn_as_gymnasium <- function(answer) {
   for (text in texts_of(answer$warnings)) {
     rlang::warn(
       text, class = "gym_warning_gymnasium", .frequency = "once",
-      .frequency_id = paste("gym", text), call = call
+      .frequency_id = paste("gym", text)
     )
   }
 }

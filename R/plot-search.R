@@ -41,10 +41,11 @@ autoplot.gym_search <- function(object, type = c("returns", "network", "landscap
   ggplot2::ggplot(search_points(object, target), ggplot2::aes(.data$x, .data$return)) +
     target_line(target) +
     ggplot2::geom_point(ggplot2::aes(colour = "episode"), size = 1.8) +
-    ggplot2::geom_line(
+    # ggplot2 has a message for a line of one point.
+    (if (nrow(means) > 1L) ggplot2::geom_line(
       ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means,
       linewidth = 0.7
-    ) +
+    )) +
     ggplot2::geom_point(
       ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means, shape = 15
     ) +

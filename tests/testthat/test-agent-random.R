@@ -291,7 +291,24 @@ test_that("a server that stops in the middle ends the search with what was playe
     env$step(action)
   }
   cnd <- tryCatch(search_random(fragile, seed = 1, target = Inf), gym_error_search = identity)
-  expect_s3_class(cnd, "gym_error_connection")
+  expect_match(conditionMessage(cnd), "on a server that has ended")
   expect_lt(sum(cnd$result$rounds$steps), 600)
   expect_gt(nrow(cnd$result$rounds), 0)
+})
+
+test_that("only who names an environment that is out of date is told so", {
+  withr::local_options(rlib_warning_verbosity = "verbose")
+  client <- test_client()
+  searched <- function(search, ...) {
+    # As if it were asked for the first time.
+    state <- client_state(client)
+    state$known_envs <- NULL
+    search(..., rounds = 1, episodes = 1, client = client)
+  }
+  expect_no_warning(searched(search_random, seed = 1))
+  expect_no_warning(searched(search_repeat, seeds = 1))
+  warned <- expect_warning(
+    searched(search_random, "CartPole-v0", seed = 1), class = "gym_warning_gymnasium"
+  )
+  expect_match(conditionMessage(warned), "^The environment CartPole-v0 is out of date")
 })

@@ -17,6 +17,11 @@ test_that("the picture shows every episode, each round's mean and the target", {
   expect_identical(key_of(picture), c("episode", "mean of the round", "target 20"))
 })
 
+test_that("a search of one round has its mean as a point, without a message", {
+  picture <- drawn(autoplot(search_of(c(7, 9), rounds = 1, target = 5)))
+  expect_identical(layers_of(picture, "GeomPoint")[[2]]$y, 8)
+})
+
 test_that("equal returns of a round lie side by side, others above each other", {
   points <- search_points(search_of(c(1, 5, 9, 2, 2, 2), rounds = 2), 20)
   expect_identical(points$x[1:3], c(1, 1, 1))
