@@ -1,5 +1,7 @@
 import csv
+import re
 import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -295,3 +297,12 @@ def test_a_non_finite_argument_is_a_number(client):
     instance = f"/v1/envs/{answer.json['instance_id']}"
     client.post(f"{instance}/reset/")
     assert client.post(f"{instance}/step/", json={"action": 1}).json["reward"] == 0.5
+
+
+def test_the_page_on_gymnasium_lists_these_wrappers():
+    page = Path(__file__).parents[4] / "vignettes" / "gymnasium.Rmd"
+    if not page.exists():
+        pytest.skip("the server is not in a checkout")
+    text = page.read_text(encoding="utf-8")
+    listed = text.partition("The server has")[2].partition("These are different")[0]
+    assert sorted(re.findall(r"`(\w+)`", listed)) == sorted(wrappers.allowed())
