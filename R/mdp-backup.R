@@ -131,16 +131,22 @@ mean_values <- function(q, probabilities) {
 #'   episode may end.
 #' @noRd
 chain_of <- function(backup, probabilities) {
-  states <- backup$states
-  weight <- backup$weight * as.vector(probabilities)
-  used <- which(weight > 0)
-  from <- (used - 1L) %% states + 1L
-  to <- backup$next_state[used]
+  moves <- policy_moves(backup, probabilities)
   mean_of <- function(x) mean_values(array(x, dim(probabilities)), probabilities)
   end <- rowSums(backup$probability * backup$terminated)
   list(
-    weight = flow_matrix(from, to, weight[used], states), from = from, to = to,
+    weight = flow_matrix(moves$from, moves$to, moves$weight, backup$states),
+    from = moves$from, to = moves$to,
     reward = mean_of(backup$expected), ends = mean_of(end) > 0 | rowSums(probabilities) == 0
+  )
+}
+
+# The moves of a policy that do not end the episode, each with its probability as `weight`.
+policy_moves <- function(backup, probabilities) {
+  weight <- backup$weight * as.vector(probabilities)
+  used <- which(weight > 0)
+  list(
+    from = (used - 1L) %% backup$states + 1L, to = backup$next_state[used], weight = weight[used]
   )
 }
 

@@ -60,27 +60,26 @@ expected_return <- function(model, backup, probabilities, limit, discount, call)
   start_mean(model, limited_values(backup, probabilities, limit, discount, call))
 }
 
+# One sweep costs as much as the policy has moves: each row of the matrices has those of a state.
 limited_values <- function(backup, probabilities, limit, discount, call) {
   if (limit == Inf) {
     return(policy_values(backup, probabilities, discount, call)$values)
   }
-  used <- which(probabilities > 0)
-  state <- (used - 1L) %% backup$states + 1L
-  if (anyDuplicated(state) || !is.null(backup$flow)) {
-    return(horizon_values(backup, limit, discount, function(q) mean_values(q, probabilities)))
-  }
-  # No state has several actions: only the rows of these actions are used.
-  weight <- discount * backup$weight[used, , drop = FALSE] * probabilities[used]
-  next_state <- backup$next_state[used, , drop = FALSE]
-  expected <- backup$expected[used] * probabilities[used]
+  moves <- policy_moves(backup, probabilities)
+  sorted <- order(moves$from, method = "radix")
+  from <- moves$from[sorted]
+  place <- sequence(rle(from)$lengths)
+  next_state <- array(1L, c(backup$states, max(place, 1L)))
+  weight <- array(0, dim(next_state))
+  next_state[cbind(from, place)] <- moves$to[sorted]
+  weight[cbind(from, place)] <- discount * moves$weight[sorted]
+  reward <- mean_values(array(backup$expected, dim(probabilities)), probabilities)
   values <- numeric(backup$states)
   for (sweep in seq_len(limit)) {
-    ahead <- expected
-    for (place in seq_len(ncol(weight))) {
-      ahead <- ahead + weight[, place] * values[next_state[, place]]
-    }
-    if (identical(ahead, values[state])) break
-    values[state] <- ahead
+    ahead <- reward + .rowSums(weight * values[next_state], nrow(weight), ncol(weight))
+    # From here on all sweeps give the same values.
+    if (identical(ahead, values)) break
+    values <- ahead
   }
   values
 }

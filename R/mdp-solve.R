@@ -171,8 +171,7 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   }
   limit <- model$spec$max_episode_steps
   limited <- if (!is.null(limit) && is.null(horizon)) {
-    values_of <- function(q) mean_values(q, probabilities)
-    start_mean(model, horizon_values(backup, limit, discount, values_of))
+    expected_return(model, backup, probabilities, limit, discount, NULL)
   }
   structure(
     list(

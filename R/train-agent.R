@@ -20,7 +20,10 @@
 #' first iteration: an untrained policy might never end an episode.
 #'
 #' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
-#' exactly, without playing. These evaluations have 0 episodes and a standard error of 0.
+#' exactly, without playing. These evaluations have 0 episodes and a standard error of 0. In a large
+#' model they take time, so between two of them lie at least so many steps of the training that they
+#' take about a tenth of it, even if `eval_every` is smaller. This number depends only on the number
+#' of states and on the step limit. It is in the training's `rules`, as `eval_steps`, and printed.
 #'
 #' # Targets
 #'
@@ -161,7 +164,8 @@
 #'     \item{provenance}{The result of [provenance()].}
 #'     \item{rules}{The budget and the rules of evaluation, a list of the arguments `iterations`,
 #'       `total_steps`, `max_steps`, `eval_every`, `eval_episodes`, `eval_episodes_curve` and
-#'       `evaluate`.}
+#'       `evaluate`, and of `eval_steps`, the smallest number of steps between two exact evaluations
+#'       (0 in a small model, `NULL` without a model).}
 #'     \item{steps, elapsed}{The number of steps and of seconds of the training, doubles.}
 #'     \item{interrupted}{Whether it was interrupted, a logical. An interrupted training has the
 #'       finished iterations.}
@@ -250,6 +254,7 @@ training_job <- function(given, kwargs, client, call) {
   settings$seed <- run$settings$seed
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
   settings$model <- if (online) judging_model(settings, client)
+  settings["eval_steps"] <- list(steps_between_evaluations(settings$model, settings$max_steps))
   if (samples_model(settings, wants_random_map(env, kwargs))) {
     settings$sampled <- model_to_sample(settings, call)
   }

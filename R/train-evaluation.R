@@ -25,6 +25,9 @@ training_ends <- function(state, vector_env, settings) {
   if (settings$search) {
     return(state$solved <- reaches(state$history[[state$iteration]]$mean_return, settings$target))
   }
+  if (evaluated_lately(state, settings)) {
+    return(FALSE)
+  }
   reached <- reaches(recent_return(state), settings$target)
   if (!reached && state$iteration %% settings$eval_every == 0) {
     curve <- evaluate_for_curve(state, vector_env, settings)
@@ -35,6 +38,17 @@ training_ends <- function(state, vector_env, settings) {
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
+}
+
+# Exact evaluations in a large model take time; see steps_between_evaluations().
+evaluated_lately <- function(state, settings) {
+  last <- utils::tail(state$evaluations, 1L)
+  if (!length(last) || !is_exact(last[[1L]])) {
+    return(FALSE)
+  }
+  iteration <- last[[1L]]$iteration
+  before <- if (iteration) state$history[[iteration]]$steps else 0
+  state$steps - before < settings$eval_steps
 }
 
 # An iteration of DQN is a single episode, and one that was lucky does not justify an evaluation of
@@ -76,11 +90,17 @@ evaluate_for_curve <- function(state, vector_env, settings) {
 evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   policy <- judged_policy(settings, state$agent)
   final <- kind == "final"
-  exact <- if (!is.null(settings$model)) {
-    evaluate_exactly(settings$model, policy, settings$max_steps)
+  last <- utils::tail(state$evaluations, 1L)
+  row <- if (length(last) && is_exact(last[[1L]]) && last[[1L]]$iteration == state$iteration) {
+    # The policy is still the same, and so is its value.
+    replace(last[[1L]], "kind", kind)
+  } else {
+    exact <- if (!is.null(settings$model)) {
+      evaluate_exactly(settings$model, policy, settings$max_steps)
+    }
+    played <- exact %||% play_evaluation(state, vector_env, settings, policy, episodes, final)
+    cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
   }
-  played <- exact %||% play_evaluation(state, vector_env, settings, policy, episodes, final)
-  row <- cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
   row.names(row) <- NULL
   state$evaluations[[length(state$evaluations) + 1L]] <- row
   if (state$iteration > 0L && !final) {

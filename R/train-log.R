@@ -125,7 +125,7 @@ warn_not_logged <- function(table, cnd) {
 
 write_config <- function(file, settings) {
   numbers <- c("iterations", "total_steps", "episodes", "target", "max_steps", "eval_every",
-               "eval_episodes", "seed")
+               "eval_steps", "eval_episodes", "seed")
   config <- c(
     list(
       agent = format(settings$agent), env = settings$env_id,

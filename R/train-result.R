@@ -26,7 +26,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
         elapsed = proc.time()[["elapsed"]] - state$started,
         interrupted = interrupted,
         max_steps = settings$max_steps,
-        rules = settings[kept_rules],
+        rules = settings[c(kept_rules, "eval_steps")],
         provenance = settings$provenance
       ),
       if (search) search_parts(settings, state, history)
@@ -111,11 +111,25 @@ training_lines <- function(x) {
     ),
     if (search) best_round_line(x),
     if (is_exact(x$final)) {
-      paste0("Expected return, by the model: ", number_text(x$final$mean_return), verdict_text(x))
+      c(
+        paste0("Expected return, by the model: ", number_text(x$final$mean_return),
+               verdict_text(x)),
+        evaluations_line(x)
+      )
     } else if (!is.null(x$final)) {
       paste0("Mean return in ", count_of(x$final$episodes, "fresh episode"), ": ",
              evaluation_text(x$final), verdict_text(x))
     }
+  )
+}
+
+# How many exact evaluations there were, and how often.
+evaluations_line <- function(x) {
+  apart <- x$rules$eval_steps %||% 0
+  paste0(
+    "Evaluated ", count_of(length(unique(x$evaluations$iteration)), "time"), ": eval_every ",
+    number_text(x$rules$eval_every),
+    if (apart > 0) paste0(", at least ", count_of(apart, "step"), " apart")
   )
 }
 

@@ -102,3 +102,26 @@ test_that("an evaluation in a training is exact where the policy draws in a few 
   random <- evaluate_policy(walk_model(max_episode_steps = 100), policy_random())
   expect_equal(c(random$mean_return, random$mean_length), c(1 / 3, 2))
 })
+
+test_that("an evaluation ends as soon as no value changes, in large models too", {
+  n <- 600
+  line <- data.frame(
+    state = rep(seq_len(n), each = 2), action = 0:1, reward = -1,
+    next_state = rep(seq_len(n), each = 2) + rep(c(-1, 1), n)
+  )
+  line$next_state[[1]] <- 1
+  model <- gym_model(line, start = n - 5)
+  # All sweeps would take hours.
+  on.exit(setTimeLimit())
+  setTimeLimit(elapsed = 60, transient = TRUE)
+  right <- c(rep(1, n), 0)
+  expect_identical(evaluate_policy(model, right, max_steps = 1e9)$mean_return, -6)
+  setTimeLimit()
+  # A solution with a horizon computes the values of all actions, sweep after sweep.
+  policies <- list(right, rep(0:1, length.out = n + 1), policy_random())
+  swept <- vapply(policies, function(policy) {
+    solve_mdp(model, policy = policy, horizon = 50)$start_value
+  }, 0)
+  exact <- evaluate_policy(model, policies, max_steps = 50)$mean_return
+  expect_equal(exact, swept, tolerance = 1e-12)
+})

@@ -207,3 +207,38 @@ test_that("a learner that knows nothing yet does not walk against one wall", {
   learned <- learn_q(gym_model(steps, start = 0), iterations = 1, episodes = 1, seed = 1)
   expect_lt(learned$history$mean_length, 150)
 })
+
+test_that("exact evaluations in a large model are a tenth of the work, and they are told", {
+  line <- data.frame(state = 1:599, action = 0, next_state = 2:600, reward = -1)
+  model <- gym_model(line, start = 550, max_episode_steps = 500)
+  learn <- function(iterations, ...) {
+    learn_q(model, iterations = iterations, episodes = 20, eval_every = 1, seed = 1, target = Inf,
+            ...)
+  }
+  learned <- learn(16)
+  # 600 states times 500 sweeps, of which a step is worth 50. An iteration has 1,000 steps.
+  expect_identical(learned$rules$eval_steps, 6000)
+  expect_identical(learned$evaluations$iteration, c(0L, 6L, 12L, 16L))
+  expect_output(print(learned), "Evaluated 4 times: eval_every 1, at least 6,000 steps apart")
+  file <- tempfile(fileext = ".rds")
+  on.exit(unlink(file))
+  learn(8, checkpoint = file)
+  resumed <- learn(16, checkpoint = file)
+  expect_identical(resumed$evaluations, learned$evaluations)
+  expect_identical(learn_q(walk_model(), iterations = 3, max_steps = 50, eval_every = 1,
+                           seed = 1, target = Inf)$evaluations$iteration, c(0:3, 3L))
+})
+
+test_that("an iteration is evaluated exactly once, for the curve, the end and the result", {
+  model <- walk_model(max_episode_steps = 50)
+  calls <- 0
+  suppressMessages(trace(
+    "evaluate_exactly", function() calls <<- calls + 1, where = asNamespace("gym"), print = FALSE
+  ))
+  on.exit(suppressMessages(untrace("evaluate_exactly", where = asNamespace("gym"))))
+  learned <- learn_q(model, iterations = 50, eval_every = 1, seed = 1, target = 1)
+  expect_true(learned$stopped_early)
+  at <- learned$evaluations
+  expect_true(all(c("stopping", "final") %in% at$kind))
+  expect_identical(calls, as.double(length(unique(at$iteration))))
+})
