@@ -17,7 +17,7 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
   if (length(space$shape) > 1L) {
     gym_abort(
       paste0("Agents that follow gradients need observations that are vectors; those of ",
-             policy$env_id, " are of ", format(space), "."),
+             env_text(policy), " are of ", format(space), "."),
       class = "gym_error_argument", argument = "env", call = NULL
     )
   }
@@ -182,7 +182,7 @@ check_values <- function(policy, name) {
   if (!inherits(space, "gym_space_discrete")) {
     gym_abort(
       c(paste0(name, " learns a value for each action of a Discrete space, but the actions of ",
-               policy$env_id, " are of ", format(space), "."),
+               env_text(policy), " are of ", format(space), "."),
         i = "Use `agent_ppo()` for these actions."),
       class = "gym_error_argument", argument = "env", call = NULL
     )

@@ -143,7 +143,7 @@ print.gym_searches <- function(x, ...) {
 
 searches_lines <- function(x) {
   c(
-    paste0("Random search in ", x$env_id, ", repeated with ",
+    paste0("Random search in ", env_text(x), ", repeated with ",
            count_of(nrow(x$searches), "seed")),
     paste0("Policy: ", policy_text(x$template)),
     "",

@@ -52,6 +52,13 @@ animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 
 #' @export
 animate.default <- function(x, file = NULL, fps = NULL, ...) {
+  if (is_given_by_id(x) || is_playable(x)) {
+    gym_abort(
+      c("`animate()` shows an episode that was played, and `x` is an environment.",
+        i = "`animate(rollout(env, policy, frames = TRUE))` plays one."),
+      class = "gym_error_argument", argument = "x", value = x, call = rlang::current_env()
+    )
+  }
   abort_argument(x, "a rollout, a search, a training or a policy", "x", rlang::current_env())
 }
 

@@ -253,8 +253,7 @@ env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
 env_close <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
-  # Its instances have ended with a server of this session.
-  if (is.null(end_of_instance(x, instance_id, Sys.getpid()))) close_instance(x, instance_id)
+  if (is.null(end_of_named(x, instance_id))) close_instance(x, instance_id)
   invisible()
 }
 

@@ -79,6 +79,7 @@ gone_codes <- c(
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   check_client(client, "x", call)
   check_string(instance_id, call = call)
+  check_not_ended(client, instance_id, call)
   instances <- client_state(client)$instances
   if (is.null(instances[[instance_id]])) {
     answer <- tryCatch(
@@ -121,6 +122,18 @@ end_of_instance <- function(client, instance_id, pid) {
       gym_error_connection = gone, gym_error_http_401 = gone, gym_error_http_404 = gone
     )
   }
+}
+
+# The same for the instance of a classic call, which is named by its id.
+end_of_named <- function(client, instance_id) {
+  state <- client_state(client)
+  known <- !is.null(state$instances[[instance_id]])
+  end_of_instance(client, instance_id, if (known) Sys.getpid() else state$made_in)
+}
+
+check_not_ended <- function(client, instance_id, call = rlang::caller_env()) {
+  ended <- end_of_named(client, instance_id)
+  if (!is.null(ended)) abort_closed("`env_create()` makes a new one.", call, paste("made", ended))
 }
 
 # Makes an instance from the server's description, after creating it or on request.

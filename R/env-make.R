@@ -24,8 +24,9 @@
 #' `observation["pole_angle"]`, `observations[, "pole_angle"]`. The parts of a Tuple, such as
 #' Blackjack's, have names as well. The names are the element `names` of
 #' `$single_observation_space`. It is `NULL` for other environments and if a wrapper changes the
-#' observations, such as `NormalizeObservation`. The classic calls return observations without
-#' names.
+#' observations, such as `NormalizeObservation`; those of a `TransformObservation` are the names of
+#' its `observation_space`. The classic calls return observations without names. Pictures show units
+#' and limits only where no wrapper changes the observations.
 #'
 #' # After the end of an episode
 #'
@@ -267,10 +268,34 @@ print_env <- function(env, how, observations, actions) {
     paste0(", ", count_of(env$num_envs, "sub-environment"), " (", how, ")")
   }
   id <- wrapped_id(env$spec$id, env$spec$wrappers)
-  cat("<gym_env: ", id, sub_envs, if (!env$is_open) ", closed", ">\n", sep = "")
-  cat("  observations: ", format(observations), "\n", sep = "")
-  cat("  actions:      ", format(actions), "\n", sep = "")
+  state <- if (!env$is_open) paste(",", end_text(env))
+  cat("<gym_env: ", id, sub_envs, state, ">\n", sep = "")
+  line <- function(what, space, names) {
+    cat("  ", what, format(space), if (length(names)) paste(":", few_names(names)), "\n", sep = "")
+  }
+  line("observations: ", observations, env$single_observation_space$names)
+  line("actions:      ", actions, env$single_action_space$names)
   invisible(env)
+}
+
+# Why an environment that is not open is not.
+end_text <- function(env) {
+  ended <- env$.__enclos_env__$private$ended
+  if (is.null(ended)) "closed" else paste("made", ended)
+}
+
+#' @export
+summary.gym_env <- function(object, ...) structure(list(env = object), class = "summary.gym_env")
+
+#' @export
+print.summary.gym_env <- function(x, ...) {
+  print(x$env)
+  spec <- x$env$spec
+  threshold <- spec$reward_threshold
+  cat("  step limit:   ", spec$max_episode_steps %||% "none", "\n", sep = "")
+  cat("  solved at:    ", if (is.null(threshold)) "no threshold" else number_text(threshold), "\n",
+      sep = "")
+  invisible(x)
 }
 
 # A name that an environment does not have is an error. (R's own `$` returns NULL, and calling that
@@ -306,14 +331,13 @@ format.gym_env <- function(x, ...) {
 check_open <- function(env, call = rlang::caller_env()) {
   if (!env$is_open) {
     hint <- paste0("`gym_make(\"", env$spec$id, "\")` makes a new one.")
-    abort_closed(hint, call, env$.__enclos_env__$private$ended)
+    abort_closed(hint, call, end_text(env))
   }
 }
 
-abort_closed <- function(hint, call, ended = NULL) {
-  problem <- if (is.null(ended)) "was closed" else paste("was made", ended)
+abort_closed <- function(hint, call, end = "closed") {
   gym_abort(
-    c(paste0("This environment ", problem, "."), i = hint),
+    c(paste0("This environment was ", end, "."), i = hint),
     class = "gym_error_argument", argument = "env", call = call
   )
 }

@@ -44,6 +44,7 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
                               video_callable = FALSE) {
   check_client(x)
   check_string(instance_id)
+  check_not_ended(x, instance_id)
   check_string(directory)
   check_flag(force)
   check_flag(resume)
@@ -63,6 +64,7 @@ env_monitor_start <- function(x, instance_id, directory, force = FALSE, resume =
 env_monitor_close <- function(x, instance_id) {
   check_client(x)
   check_string(instance_id)
+  check_not_ended(x, instance_id)
   post_answer(x, paste0(instance_route(instance_id), "monitor/close/"))
   invisible()
 }

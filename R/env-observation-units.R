@@ -34,6 +34,16 @@ episode_limits <- list(
 )
 episode_limits$LunarLanderContinuous <- episode_limits$LunarLander
 
+#' Find the id whose documentation describes the values in a result
+#' @param what "Observation" or "Action".
+#' @return A string; `NULL` if a wrapper changes the values, which then have other units and none
+#'   of the documented limits.
+#' @noRd
+described_id <- function(x, what = "Observation") {
+  changing <- paste0(c("Discretize", "Normalize", "Rescale", "Transform"), what)
+  if (!any(changing %in% wrappers_around(x))) x$env_id
+}
+
 #' Write the name of a part of an observation with its unit
 #' @param names Names of columns of a table of steps.
 #' @return Strings such as `"pole angle (rad)"`; unknown names are unchanged.

@@ -21,6 +21,7 @@
 env_render <- function(x, instance_id, which = 1) {
   check_client(x)
   check_string(instance_id)
+  check_not_ended(x, instance_id)
   check_count(which)
   query <- if (which != 1) paste0("?sub_env=", whole_text(which - 1))
   route <- paste0(instance_route(instance_id), "render/", query)

@@ -142,6 +142,22 @@ remembering <- function(names) {
 # The name of an environment in prints, with the wrappers around it: returns depend on these, too.
 wrapped_id <- function(env_id, wrappers) paste(c(env_id, wrappers), collapse = " |> ")
 
+# The same of the environment of a result or of a policy; `NULL` if it is unknown.
+env_text <- function(x) if (!is.null(x$env_id)) wrapped_id(x$env_id, wrappers_around(x))
+
+wrappers_around <- function(x) x$wrappers %||% x$provenance$wrappers
+
+#' Name the environments of several results
+#' @param results A list of results with an element `env_id`.
+#' @return A string for each different `env_id`, named by it. Several environments that differ by
+#'   their wrappers alone are named in one string.
+#' @noRd
+env_names <- function(results) {
+  ids <- vapply(results, function(x) x$env_id, "")
+  texts <- split(vapply(results, env_text, ""), factor(ids, unique(ids)))
+  vapply(texts, function(of_one) toString(unique(of_one)), "")
+}
+
 #' @export
 format.gym_wrapped <- function(x, ...) {
   paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")

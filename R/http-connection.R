@@ -21,6 +21,8 @@ client_state <- function(client) {
       state$to_close <- character()
       state$health <- NULL
       state$line <- NULL
+      # The process in which the client was first used.
+      state$made_in <- state$made_in %||% state$pid %||% Sys.getpid()
       state$pid <- Sys.getpid()
       state$session <- the_session
     })

@@ -88,7 +88,7 @@ print.gym_evaluation <- function(x, ...) {
     return(invisible(NextMethod()))
   }
   cat(
-    paste0("Evaluation in ", wrapped_id(attr(x, "env_id"), attr(x, "provenance")$wrappers), ": ",
+    paste0("Evaluation in ", env_text(attributes(x)), ": ",
            count_of(sum(x$episodes), "episode"), ", ", count_of(sum(x$steps), "step")),
     paste0("Policy: ", policy_text(attr(x, "policy"))),
     sep = "\n"

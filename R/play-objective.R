@@ -94,7 +94,7 @@ same_episodes <- function(seed, episodes, max_steps) {
 #' @export
 print.gym_objective <- function(x, ...) {
   policy <- attr(x, "policy")
-  cat("<objective: minus the mean return of ", format(policy), " in ", policy$env_id, ">\n",
+  cat("<objective: minus the mean return of ", format(policy), " in ", env_text(policy), ">\n",
       sep = "")
   invisible(x)
 }

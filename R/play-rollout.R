@@ -297,7 +297,7 @@ print.gym_rollout <- function(x, ...) {
 rollout_lines <- function(x) {
   returns <- x$episodes$return
   c(
-    paste0("Rollout in ", wrapped_id(x$env_id, x$provenance$wrappers), ": ",
+    paste0("Rollout in ", env_text(x), ": ",
            count_of(length(returns), "episode"), ", ", count_of(sum(x$episodes$length), "step")),
     paste0("Policy: ", policy_text(x$policy)),
     if (is.null(x$episodes$candidate)) paste0("Return: ", returns_text(returns))
@@ -353,7 +353,7 @@ summary.gym_rollout <- function(object, ...) {
 #' @export
 print.summary.gym_rollout <- function(x, ...) {
   cat(
-    paste0("Rollout in ", wrapped_id(x$env_id, x$wrappers), ": ",
+    paste0("Rollout in ", env_text(x), ": ",
            count_of(x$episodes, "episode"), ", ", count_of(x$steps, "step")),
     paste0("Policy: ", policy_text(x$policy)),
     if (is.null(x$candidates)) paste0("Mean return: ", number_text(x$mean), se_text(x$se)),

@@ -36,10 +36,9 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
   bands <- object$by == "steps" || type == "profile"
   shape <- if (bands) "band" else "bar"
   notes <- if (length(object$notes)) paste0("note: ", object$notes)
-  ids <- unique(object$runs$env_id)
   picture +
     picture_labels(
-      if (!anyNA(ids)) paste(ids, collapse = ", "),
+      if (length(object$envs)) toString(object$envs),
       paste0(shape, ": ", percent_text(object$level), " interval"), caption = notes
     ) +
     theme_gym()
@@ -127,7 +126,9 @@ reached_picture <- function(x) {
   picture +
     ggplot2::geom_point(data = failed, shape = 3, show.legend = FALSE) +
     (if (length(unique(rows$env_id)) > 1L) {
-      ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free_x")
+      ggplot2::facet_wrap(
+        ggplot2::vars(.data$env_id), scales = "free_x", labeller = ggplot2::as_labeller(x$envs)
+      )
     }) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
     picture_labels(x = training_steps_label, y = "share that reached the target")

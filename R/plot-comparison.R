@@ -32,7 +32,9 @@ comparison_picture <- function(rollouts) {
     } else {
       ggplot2::facet_grid(
         ggplot2::vars(.data$label), ggplot2::vars(.data$env_id), scales = "free_x", switch = "y",
-        labeller = wrapped_strips(3)
+        labeller = ggplot2::labeller(
+          label = wrapped_strips(3), env_id = ggplot2::as_labeller(data$envs, wrapped_strips(3))
+        )
       )
     }) +
     ggplot2::scale_fill_manual(
@@ -44,7 +46,7 @@ comparison_picture <- function(rollouts) {
         ggplot2::waiver()
     ) +
     ggplot2::scale_y_continuous(breaks = NULL, expand = ggplot2::expansion(c(0.12, 0.03))) +
-    picture_labels(data$title, data$subtitle, x = "return of an episode", y = NULL) +
+    picture_labels(toString(data$envs), data$subtitle, x = "return of an episode", y = NULL) +
     theme_gym() +
     ggplot2::theme(
       strip.text.y.left = ggplot2::element_text(angle = 0, hjust = 1),
@@ -81,7 +83,7 @@ row_titles <- function(rows) {
 #' @param rollouts A list of rollouts with names.
 #' @return A list: `rows`, a data frame with a row for each policy and environment, from the top:
 #'   `label`, `env_id`, `median`; `returns`, a data frame: `label`, `env_id`, `value`, and `kind`,
-#'   how the policy's returns are drawn; `title`, `subtitle`.
+#'   how the policy's returns are drawn; `envs`, as [env_names()] returns them; `subtitle`.
 #' @noRd
 comparison_plot_data <- function(rollouts) {
   each <- Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)
@@ -101,7 +103,7 @@ comparison_plot_data <- function(rollouts) {
       value = unlist(shown, use.names = FALSE),
       kind = rep(vapply(shown, returns_kind, ""), lengths(shown))
     ),
-    title = paste(names(by_env), collapse = ", "),
+    envs = env_names(rollouts),
     subtitle = c(
       if (length(shown) < length(groups)) {
         paste("the", length(shown), "of", length(groups), "policies with the highest mean returns")

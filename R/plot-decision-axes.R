@@ -7,7 +7,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   if (!is.null(space) && !inherits(space, "gym_space_box")) {
     gym_abort(
       c(paste0("A decision map shows two numbers of an observation, but observations ",
-               if (!is.null(place$env_id)) paste0("in ", place$env_id, " "), "are of ",
+               if (!is.null(place$env_id)) paste0("in ", env_text(place), " "), "are of ",
                format(space), "."),
         i = "`act(policy, )` gives the action for each single observation."),
       class = "gym_error_argument", argument = "policy", value = place$policy, call = call
@@ -23,7 +23,7 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   }
   names <- number_names(space, n)
   list(
-    names = names, usual = usual_ranges(place$env_id, names),
+    names = names, usual = usual_ranges(described_id(place), names),
     low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)
   )
 }

@@ -139,7 +139,8 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
     list(
       grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
       kind = decided$kind, at = held[-axes], path = way, actions = decided$actions,
-      limits = decided$limits, env_id = place$env_id, policy = place$policy
+      limits = decided$limits, env_id = place$env_id,
+      wrappers = place$wrappers, policy = place$policy
     ),
     class = "gym_decision_map"
   )
@@ -178,7 +179,8 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
     policy <- policy_bind(policy, known, call = call)
     return(list(
       policy = policy, observation_space = known$observation_space,
-      action_space = known$action_space, env_id = known$spec$id
+      action_space = known$action_space, env_id = known$spec$id,
+      wrappers = known$spec$wrappers
     ))
   }
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
@@ -190,7 +192,7 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
       class = "gym_error_argument", argument = "env", value = env, call = call
     )
   }
-  c(list(policy = policy), policy[c("observation_space", "action_space", "env_id")])
+  c(list(policy = policy), policy[c("observation_space", "action_space", "env_id", "wrappers")])
 }
 
 # The actions ----------------------------------------------------------------------
@@ -279,7 +281,7 @@ print.gym_decision_map <- function(x, ...) {
     paste0(x$x, " by ", x$y, ", ", size, " x ", size, " points")
   )
   cat(
-    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", x$env_id), ": ", shows),
+    paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", env_text(x)), ": ", shows),
     paste0("Policy: ", policy_text(x$policy)),
     held_text(x$at),
     sep = "\n"

@@ -54,7 +54,8 @@ new_state_map <- function(place, in_play, call) {
   structure(
     list(
       grid = data.frame(state = states, action = actions), x = "state", kind = "state",
-      action_space = place$action_space, env_id = place$env_id, policy = place$policy
+      action_space = place$action_space, env_id = place$env_id,
+      wrappers = place$wrappers, policy = place$policy
     ),
     class = c("gym_state_map", "gym_decision_map")
   )
@@ -103,7 +104,8 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
       actions = action_names(
         place$env_id, as.integer(place$action_space$n), place$action_space$start
       ),
-      action_space = place$action_space, env_id = place$env_id, policy = place$policy
+      action_space = place$action_space, env_id = place$env_id,
+      wrappers = place$wrappers, policy = place$policy
     ),
     class = c("gym_parts_map", "gym_decision_map")
   )

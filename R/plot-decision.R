@@ -31,9 +31,9 @@ autoplot.gym_decision_map <- function(object, ...) {
     ggplot2::scale_x_continuous(expand = c(0, 0)) +
     ggplot2::scale_y_continuous(expand = c(0, 0)) +
     picture_labels(
-      object$env_id %||% "Decision map", policy_subtitle(object),
-      x = observation_labels(object$env_id, object$x),
-      y = observation_labels(object$env_id, object$y)
+      env_text(object) %||% "Decision map", policy_subtitle(object),
+      x = observation_labels(described_id(object), object$x),
+      y = observation_labels(described_id(object), object$y)
     ) +
     theme_gym()
 }

@@ -28,7 +28,6 @@ autoplot.gym_evaluation <- function(object, ...) {
   shown <- if (few) seq_len(nrow(object)) else order(-object$mean_return)[seq_len(most_rows)]
   rows <- as.data.frame(as.list(object)[evaluation_columns])[shown, ]
   rows$label <- factor(row.names(object)[shown], rev(row.names(object)[shown]))
-  origin <- attr(object, "provenance")
   ggplot2::ggplot(rows, ggplot2::aes(.data$mean_return, .data$label)) +
     # A single episode has no interval.
     ggplot2::geom_linerange(
@@ -38,7 +37,7 @@ autoplot.gym_evaluation <- function(object, ...) {
     ggplot2::geom_point(colour = gym_colours[["blue"]], size = 2.5) +
     number_axis(ggplot2::scale_x_continuous) +
     picture_labels(
-      wrapped_id(attr(object, "env_id"), origin$wrappers),
+      env_text(attributes(object)),
       c(
         if (!few) {
           paste("the", most_rows, "of", nrow(object), "policies with the highest mean returns")

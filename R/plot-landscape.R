@@ -44,7 +44,7 @@ autoplot.gym_landscape <- function(object, ...) {
     ggplot2::scale_x_continuous(expand = c(0, 0)) +
     ggplot2::scale_y_continuous(expand = c(0, 0)) +
     picture_labels(
-      object$env_id, "networks around the best policy", x = "first direction",
+      env_text(object), "networks around the best policy", x = "first direction",
       y = "second direction"
     ) +
     theme_gym()

@@ -77,7 +77,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     side_names(units) +
     ggplot2::coord_cartesian(clip = "off") +
     picture_labels(
-      policy$env_id %||% "Policy", c(network_sizes(policy), "wider lines are further from 0")
+      env_text(policy) %||% "Policy", c(network_sizes(policy), "wider lines are further from 0")
     ) +
     theme_gym_bare() +
     ggplot2::theme(

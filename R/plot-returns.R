@@ -18,7 +18,7 @@ returns_picture <- function(x) {
       expand = ggplot2::expansion(mult = c(0, 0.05))
     ) +
     picture_labels(
-      x$env_id,
+      env_text(x),
       c(policy_subtitle(x), count_of(length(returns), "episode"),
         paste("median", number_text(stats::median(returns)), "(dashed)")),
       x = returns_label, y = if (counts) "episodes" else "density"

@@ -92,7 +92,7 @@ check_have_episodes <- function(rollouts, call) {
   for (rollout in rollouts) {
     if (!nrow(rollout$episodes)) {
       gym_abort(
-        c(paste0("A rollout in ", rollout$env_id, " has no episode to plot: it was interrupted ",
+        c(paste0("A rollout in ", env_text(rollout), " has no episode to plot: it was interrupted ",
                  "before the first batch of episodes had ended."),
           i = "The same call of `rollout()` with its `seed` plays it again."),
         class = "gym_error_argument", argument = "x", value = rollout, call = call

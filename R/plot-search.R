@@ -58,7 +58,7 @@ autoplot.gym_search <- function(object, type = c("returns", "network", "landscap
     )) +
     ggplot2::scale_x_continuous(breaks = round_ticks(max(means$round))) +
     picture_labels(
-      paste("Random search in", object$env_id), search_outcome(object), x = "round", y = "return"
+      paste("Random search in", env_text(object)), search_outcome(object), x = "round", y = "return"
     ) +
     theme_gym()
 }

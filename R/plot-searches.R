@@ -46,7 +46,7 @@ autoplot.gym_searches <- function(object, mark = 3, ...) {
     ) +
     ggplot2::scale_y_continuous(breaks = function(limits) unique(round(pretty(limits)))) +
     picture_labels(
-      paste("Random search in", object$env_id),
+      paste("Random search in", env_text(object)),
       c(count_of(nrow(object$searches), "seed"), if (!is.null(mark)) marked_label(object, mark)),
       x = "rounds to solve", y = "searches"
     ) +

@@ -53,7 +53,7 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   }
   shown <- if (type == "q") "values of actions" else policy_subtitle(object)
   picture +
-    picture_labels(object$env_id %||% "Decision map", c(shown, taxi_subtitle(data)), width = 40)
+    picture_labels(env_text(object) %||% "Decision map", c(shown, taxi_subtitle(data)), width = 40)
 }
 
 # The action in each state without a grid. Few actions have their names on the axis.

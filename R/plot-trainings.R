@@ -40,8 +40,8 @@ autoplot.gym_trainings <- function(object, ...) {
 trainings_picture <- function(trainings, call = rlang::caller_env()) {
   each <- Map(evaluation_curves, trainings, names(trainings), list(call))
   labels <- unique(names(trainings))
-  ids <- vapply(trainings, function(x) x$env_id, "")
-  ids <- factor(ids, unique(ids))
+  shown <- env_names(trainings)
+  ids <- factor(vapply(trainings, function(x) x$env_id, ""), names(shown))
   ends <- vapply(each, function(curves) max(unlist(lapply(curves, `[[`, "steps"))), 0)
   last <- stats::ave(ends, ids, FUN = max)
   curves <- do.call(rbind, Map(trainings_curve, each, names(trainings), last, seq_along(ids)))
@@ -68,7 +68,11 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
       ggplot2::aes(y = .data$median, ymin = .data$lower, ymax = .data$upper),
       curves[points_each(curves) == 1, ], show.legend = FALSE
     ) +
-    (if (nlevels(ids) > 1L) ggplot2::facet_wrap(ggplot2::vars(.data$env_id), scales = "free")) +
+    (if (nlevels(ids) > 1L) {
+      ggplot2::facet_wrap(
+        ggplot2::vars(.data$env_id), scales = "free", labeller = ggplot2::as_labeller(shown)
+      )
+    }) +
     ggplot2::scale_fill_manual(values = named_colours(labels), guide = "none") +
     key_of_marks(c(line_marks(labels), target_mark(target))) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
@@ -154,12 +158,11 @@ trainings_curve <- function(each, label, last, training) {
 }
 
 trainings_title <- function(trainings) {
-  ids <- unique(vapply(trainings, function(x) x$env_id, ""))
+  where <- toString(env_names(trainings))
   if (length(trainings) > 1L) {
-    return(paste(ids, collapse = ", "))
+    return(where)
   }
   x <- trainings[[1L]]
-  where <- wrapped_id(ids, each_training(x)[[1L]]$provenance$wrappers)
   count <- if (inherits(x, "gym_trainings")) paste0(", ", count_of(length(x$trainings), "seed"))
   paste0(training_label(x), " in ", where, count)
 }

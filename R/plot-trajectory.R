@@ -35,7 +35,7 @@ trajectory_picture <- function(x, data) {
       breaks = trajectory_breaks(values), guide = ggplot2::guide_axis(check.overlap = TRUE)
     ) +
     picture_labels(
-      x$env_id, c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL
+      env_text(x), c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL
     ) +
     theme_gym_panels() +
     # If the last panel stands alone, the title of its axis is below it.
@@ -154,8 +154,8 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
   names(values) <- c(shown$observed, shown$actions)
   choices <- action_choices(x, values[shown$actions])
   labels <- c(
-    observation_labels(x$env_id, shown$observed),
-    rep(action_title(x$env_id, shown$actions), length(shown$actions))
+    observation_labels(described_id(x), shown$observed),
+    rep(action_title(described_id(x, "Action"), shown$actions), length(shown$actions))
   )
   kinds <- vapply(values, function(value) if (all_whole(value)) "stairs" else "line", "")
   kinds[shown$actions] <- if (!is.null(choices)) "choice" else kinds[shown$actions]
@@ -168,7 +168,7 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
       step = steps$step, time = steps$step - 1L,
       value = as.numeric(unlist(lapply(values, as.numeric)))
     ),
-    limits = trajectory_limits(x$env_id, shown$observed, labels),
+    limits = trajectory_limits(described_id(x), shown$observed, labels),
     choices = choices,
     actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
     length = n,

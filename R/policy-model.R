@@ -195,6 +195,7 @@ policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()
   policy$observation_space <- env$observation_space
   policy$action_space <- actions
   policy["env_id"] <- list(env$spec$id)
+  policy$wrappers <- env$spec$wrappers
   policy
 }
 

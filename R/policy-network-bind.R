@@ -14,6 +14,7 @@ policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy["env_id"] <- list(env$spec$id)
+  policy$wrappers <- env$spec$wrappers
   policy
 }
 

@@ -38,7 +38,8 @@
 #'   the digits.
 #' @param ... Spaces: without names for `space_tuple()`, with different names for `space_dict()`.
 #' @return An object of class `gym_space`, a list with the elements that [space_sample()] lists for
-#'   its kind. A Box whose bounds have names also has the element `names`.
+#'   its kind. A Box whose bounds have names also has the element `names`, and so has a
+#'   MultiDiscrete space with the names of `nvec`.
 #' @section Errors: `gym_error_argument`, which names the argument and the value.
 #' @export
 #' @examples
@@ -93,10 +94,12 @@ space_multi_discrete <- function(nvec, start = 0) {
     must <- paste("a single whole number or, as `nvec`,", wanted_shape(shape))
     abort_argument(start, must, "start", rlang::current_env())
   }
-  make_space(
+  space <- make_space(
     "MultiDiscrete", shape = shape, dtype = "int64", nvec = narrow_whole(row_major(nvec)),
     start = narrow_whole(rep_len(row_major(start), length(nvec)))
   )
+  space$names <- names_of_numbers(nvec, start, shape)
+  space
 }
 
 #' @rdname space_box
@@ -196,17 +199,19 @@ check_bounds_order <- function(low, high, call = rlang::caller_env()) {
   }
 }
 
-names_of_numbers <- function(low, high, shape, call = rlang::caller_env()) {
-  names <- names(low) %||% names(high)
+# The names of the numbers of a space, which its first argument or its second has.
+names_of_numbers <- function(x, y, shape, x_arg = rlang::caller_arg(x),
+                             y_arg = rlang::caller_arg(y), call = rlang::caller_env()) {
+  names <- names(x) %||% names(y)
   if (is.null(names)) {
     return(NULL)
   }
   if (!identical(length(names), shape) || !all(nzchar(names)) || anyDuplicated(names)) {
-    arg <- if (is.null(names(low))) "names(high)" else "names(low)"
+    arg <- paste0("names(", if (is.null(names(x))) y_arg else x_arg, ")")
     abort_argument(names, "a name of its own for each number", arg, call)
   }
-  if (!identical(names(high) %||% names, names)) {
-    abort_argument(names(high), "those of `low`", "names(high)", call)
+  if (!identical(names(y) %||% names, names)) {
+    abort_argument(names(y), paste0("those of `", x_arg, "`"), paste0("names(", y_arg, ")"), call)
   }
   enc2utf8(names)
 }

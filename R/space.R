@@ -26,6 +26,21 @@ init_space.default <- function(space) {
   )
 }
 
+# As Gymnasium writes them. `$` is fast, because every step reads elements of spaces.
+#' @export
+`$.gym_space` <- function(x, name) {
+  element <- .subset2(x, name)
+  if (is.null(element)) {
+    switch(
+      name,
+      sample = function() space_sample(x),
+      contains = function(value) space_contains(x, value)
+    )
+  } else {
+    element
+  }
+}
+
 # In words ------------------------------------------------------------------------
 
 # A space in words, without the brackets that format() adds.
@@ -110,6 +125,8 @@ write_value <- function(space, value) UseMethod("write_value")
 #'
 #' The distributions are Gymnasium's: uniform between two bounds, exponential with a single one,
 #' normal without any; the length of a sequence is geometric.
+#'
+#' `space$sample()` and `space$contains(value)` are the same functions, named as in Gymnasium.
 #'
 #' @param space A space, such as `gym_make("CartPole-v1")$action_space`.
 #' @param value The value to check: any R object.

@@ -63,6 +63,7 @@
 #'     \item{profile}{A data frame of the curves that [plot()][plot.gym_comparison()] shows:
 #'       `training`, `score` (or `env_id` and `steps`), `share`, `lower`, `upper`.}
 #'     \item{reference}{The data frame that normalised the scores, or `NULL`.}
+#'     \item{envs}{The environments with their wrappers, strings with the names `env_id`.}
 #'     \item{notes}{Differences that make the comparison unfair, strings.}
 #'     \item{total_steps, level, reps, seed}{As given, found or drawn.}
 #'   }
@@ -117,6 +118,12 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
     compare_by_scores(trainings, curves %||% curves_of(trainings), settings, reference, call)
   }
   settings["total_steps"] <- compared["total_steps"]
+  ids <- unique(compared$runs$env_id)
+  compared$envs <- if (length(trainings)) {
+    env_names(trainings)
+  } else if (!anyNA(ids)) {
+    stats::setNames(ids, ids)
+  }
   compared$notes <- c(compared$notes, unequal_rules(trainings))
   compared$total_steps <- NULL
   few <- min(runs_each(compared$runs))
@@ -250,9 +257,9 @@ improvement_lines <- function(pairs, interval) {
 
 comparison_lines <- function(x, pairs = TRUE) {
   scores <- x$by == "scores"
-  ids <- unique(x$runs$env_id)
+  envs <- length(x$envs)
   seeds <- unique(range(runs_each(x$runs)))
-  where <- if (length(ids) > 1L) count_of(length(ids), "environment") else ids
+  where <- if (envs > 1L) count_of(envs, "environment") else x$envs
   table <- x$table
   interval <- function(value, lower, upper) {
     text <- number_text_each
@@ -264,7 +271,7 @@ comparison_lines <- function(x, pairs = TRUE) {
     data.frame(columns, row.names = unique(table$training))
   } else {
     columns <- c(
-      if (length(ids) > 1L) table["env_id"],
+      if (envs > 1L) table["env_id"],
       list(
         reached = paste(table$reached, "of", table$runs),
         `median steps` = interval(table$median, table$lower, table$upper)
@@ -274,7 +281,7 @@ comparison_lines <- function(x, pairs = TRUE) {
   }
   c(
     paste0(
-      if (scores) "Scores" else "Steps to the target", if (!anyNA(where)) paste0(" in ", where),
+      if (scores) "Scores" else "Steps to the target", if (envs) paste0(" in ", where),
       if (scores) paste(if (x$by_end) " at a budget of" else " after",
                         count_of(round(x$total_steps), "step")),
       ", ", paste(seeds, collapse = " to "), " seed", if (max(seeds) > 1L) "s", " each"

@@ -161,6 +161,7 @@ play_plane <- function(vector_env, plane, search, episodes, streams, progress) {
     list(
       grid = plane$grid, best = plane$grid$mean_return[[(points + 1L) / 2L]],
       directions = plane$directions, policy = search$policy, env_id = search$env_id,
+      wrappers = wrappers_around(search),
       target = search$target, episodes = episodes,
       seeds = unique(unlist(lapply(history$batches, function(batch) batch$seed))),
       common = has_common_seeds(vector_env),
@@ -180,7 +181,7 @@ print.gym_landscape <- function(x, ...) {
   played <- x$grid$mean_return[!is.na(x$grid$mean_return)]
   n <- sqrt(nrow(x$grid))
   cat(
-    paste0("Landscape around the best policy found in ", x$env_id, ": ", n, " x ", n,
+    paste0("Landscape around the best policy found in ", env_text(x), ": ", n, " x ", n,
            " networks, ", count_of(x$episodes, "episode"), " each",
            if (x$common) ", the same for all"),
     landscape_returns_line(x, played),

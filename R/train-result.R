@@ -102,7 +102,7 @@ training_lines <- function(x) {
   }
   target <- if (!is.null(x$target)) paste0(" (target ", number_text(x$target), ")")
   c(
-    paste0("Training in ", wrapped_id(x$env_id, x$provenance$wrappers), " by ",
+    paste0("Training in ", env_text(x), " by ",
            if (search) "random search" else format(x$agent)),
     paste0("Policy: ", policy_text(x$policy %||% x$template)),
     paste0(

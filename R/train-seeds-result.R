@@ -130,8 +130,7 @@ trainings_lines <- function(x) {
   done <- table[!table$interrupted, ]
   returns <- done$mean_return[!is.na(done$mean_return)]
   c(
-    paste0("Training in ", wrapped_id(x$env_id, x$trainings[[1L]]$provenance$wrappers), " by ",
-           format(x$agent)),
+    paste0("Training in ", env_text(x), " by ", format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
     if (nrow(done) && has_target(x)) reached_lines(done, x$target),
     if (length(returns)) {

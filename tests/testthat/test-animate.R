@@ -306,3 +306,10 @@ test_that("without anything that writes a video one command is named", {
     "install.packages(\"av\")", fixed = TRUE, class = "gym_error_argument"
   )
 })
+
+test_that("an environment is not animated: the message has the call that plays it", {
+  for (env in list("CartPole-v1", gym_wrap("CartPole-v1", "ClipReward"), fake_environment())) {
+    expect_error(animate(env, policy_random()), "`animate(rollout(env, policy, frames = TRUE))`",
+                 fixed = TRUE, class = "gym_error_argument")
+  }
+})

@@ -46,7 +46,7 @@ test_that("an environment whose server has ended is not open, and says so", {
                       func = function(reward) -reward)
   classic <- env_create(server, "CartPole-v1")
   file <- withr::local_tempfile()
-  saveRDS(single, file)
+  saveRDS(list(single, server, classic), file)
   for (env in list(single, several, wrapped)) env$reset()
   gym_server_stop(server)
   # Before anything else has noticed it.
@@ -56,12 +56,21 @@ test_that("an environment whose server has ended is not open, and says so", {
     expect_error(env$reset(), "on a server that has ended", class = "gym_error_argument")
     expect_silent(env$close())
   }
+  for (call in list(env_reset, env_render, env_action_space_sample, env_monitor_close)) {
+    expect_error(call(server, classic), "was made on a server that", class = "gym_error_argument")
+  }
+  expect_error(env_step(server, classic, 1), "a server that has ended", class = "gym_error_argument")
   expect_silent(env_close(server, classic))
+  expect_output(print(single), "<gym_env: CartPole-v1, made on a server that has ended>")
+  expect_output(print(wrapped), "TransformReward, made on a server that has ended>")
   script <- paste0(
-    "library(gym); env <- readRDS('", normalizePath(file, "/"), "');",
+    "library(gym); saved <- readRDS('", normalizePath(file, "/"), "');",
+    "env <- saved[[1]]; client <- saved[[2]]; id <- saved[[3]];",
     "say <- function(code) tryCatch(code, error = function(cnd) cat(conditionMessage(cnd)));",
-    "say(env$step(1)); say(env$reset()); cat(env$is_open, env$close()$is_open)"
+    "print(env); say(env$step(1)); say(env$reset()); cat(env$is_open, env$close()$is_open);",
+    "say(env_step(client, id, 1)); say(env_reset(client, id)); env_close(client, id)"
   )
   said <- processx::run(file.path(R.home("bin"), "Rscript"), c("-e", script))$stdout
-  expect_match(said, "made in a session that has ended.*in a session that has ended.*FALSE FALSE")
+  said <- gsub("made in a session that has ended", "ENDED", said)
+  expect_match(said, "CartPole-v1, ENDED>.*ENDED.*ENDED.*FALSE FALSE.*ENDED.*ENDED")
 })

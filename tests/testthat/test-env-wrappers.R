@@ -65,3 +65,81 @@ test_that("a wrapper that is not allowed, or has no such argument, is the server
                         class = "gym_error_http_400")
   expect_identical(error$code, "invalid_kwargs")
 })
+
+# MountainCar's observations and their units, without its server.
+slow_car <- function() {
+  gym_env(
+    function(self) c(self$position <- -0.5, 0),
+    function(self, action) {
+      self$position <- self$position + 0.1 * (action - 1)
+      list(
+        observation = c(self$position, 0), reward = -1, terminated = abs(self$position + 0.5) > 0.5
+      )
+    },
+    space_box(c(position = -1.2, velocity = -0.07), c(0.6, 0.07)), space_discrete(3),
+    id = "MountainCar-v0", max_episode_steps = 20
+  )
+}
+
+test_that("titles and prints name the wrappers of what was played", {
+  car <- slow_car() |> gym_wrap("TransformReward", func = function(reward) reward / 10)
+  name <- "MountainCar-v0 |> TransformReward"
+  policy <- policy_network(c(2, 3), weights = list(matrix(1:6 / 10, 3)))
+  played <- rollout(car, policy, 3, seed = 1, steps = TRUE)
+  map <- decision_map(car, policy)
+  search <- search_random(car, policy, rounds = 2, episodes = 1, target = -100, seed = 1,
+                          progress = FALSE)
+  repeated <- search_repeat(car, policy, rounds = 2, episodes = 1, target = -100, seeds = 1:2,
+                            progress = FALSE)
+  landscape <- search_landscape(search, size = 3, episodes = 1, seed = 1, progress = FALSE)
+  train <- function(env) {
+    train_agent(agent_hill_climb(), env, policy = policy, iterations = 2, eval_every = 1,
+                eval_episodes = 2, target = Inf, seed = 1, progress = FALSE)
+  }
+  trained <- train(car)
+  compared <- suppressWarnings(compare_trainings(trained, seed = 1))
+  title <- function(...) gsub("\n", " ", ggplot2::autoplot(...)$labels$title)
+  plotted <- list(
+    title(played), title(played, type = "trajectory"), title(a = played, b = played), title(map),
+    title(evaluate_policy(car, policy, 2, seed = 1)), title(search), title(repeated),
+    title(landscape), title(search$policy), title(trained), title(compared),
+    title(a = trained, b = trained)
+  )
+  for (shown in plotted) expect_match(shown, name, fixed = TRUE)
+  objective <- gym_objective(car, policy, episodes = 1, seed = 1)
+  for (result in list(played, map, search, repeated, landscape, trained, compared, objective)) {
+    expect_output(print(result), name, fixed = TRUE)
+  }
+  # What differs by its wrapper alone stays in one panel.
+  expect_identical(title(a = train(slow_car()), b = trained), paste0("MountainCar-v0, ", name))
+})
+
+test_that("values that a wrapper has changed have no units and no limits", {
+  labels <- function(env) {
+    played <- rollout(env, policy_random(), seed = 1, steps = TRUE)
+    drawn <- trajectory_plot_data(played)
+    list(names = drawn$panels$panel, limits = nrow(drawn$limits))
+  }
+  car <- slow_car()
+  kept <- list(names = c("position (m)", "velocity", "action"), limits = 1L)
+  expect_identical(labels(car), kept)
+  expect_identical(labels(gym_wrap(car, "ClipReward", max_reward = 0)), kept)
+  changed <- list(names = c("position", "velocity", "action"), limits = 0L)
+  tenth <- function(observation) observation / 10
+  network <- policy_network(c(2, 3), weights = list(matrix(1:6 / 10, 3)))
+  for (wrapped in list(
+    gym_wrap(car, "NormalizeObservation"),
+    gym_wrap(car, "RescaleObservation", min_obs = -1, max_obs = 1),
+    gym_wrap(car, "TransformObservation", func = tenth)
+  )) {
+    expect_identical(labels(wrapped), changed)
+    map <- decision_map(wrapped, network, xlim = 0:1, ylim = 0:1)
+    expect_identical(ggplot2::autoplot(map)$labels$x, "position")
+  }
+  own <- gym_wrap(car, "TransformObservation", func = tenth,
+                  observation_space = space_box(-1, 1, shape = 2))
+  expect_identical(labels(own)$names, c("obs_1", "obs_2", "action"))
+  swapped <- gym_wrap(car, "TransformObservation", func = function(observation) observation[, 2:1])
+  expect_error(rollout(swapped, policy_random(), 2, num_envs = 2),
+               "returned `velocity`, `position` for", class = "gym_error_wrapper")
+})

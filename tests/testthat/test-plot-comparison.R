@@ -89,7 +89,7 @@ test_that("each environment has a column, with axis and bars of its own", {
 
 test_that("the title names every environment", {
   data <- comparison_plot_data(list(a = played_with(1:3), b = played_with(1:3, id = "Other-v0")))
-  expect_identical(data$title, "Fake-v0, Other-v0")
+  expect_identical(toString(data$envs), "Fake-v0, Other-v0")
 })
 
 test_that("what cannot be compared is refused", {

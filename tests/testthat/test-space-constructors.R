@@ -136,3 +136,20 @@ test_that("a space from other arguments is an error that names them", {
   wrong(space_dict(a = 1), "`a` must be a space, not 1.")
   wrong(space_dict(a = space_discrete(2), a = space_discrete(3)), "more than once")
 })
+
+test_that("the numbers of a MultiDiscrete space keep their names, wherever they are seen", {
+  space <- space_multi_discrete(c(suit = 4, rank = 13), start = 1)
+  expect_identical(space$names, c("suit", "rank"))
+  expect_error(space_multi_discrete(c(a = 2, a = 2)), "`names(nvec)`", fixed = TRUE,
+               class = "gym_error_argument")
+  cards <- gym_env(
+    function(self) c(1, 13),
+    function(self, action) list(observation = action, reward = 0, terminated = TRUE),
+    space, space, max_episode_steps = 5
+  )
+  expect_identical(cards$reset(), c(suit = 1, rank = 13))
+  expect_identical(cards$step(c(rank = 7, suit = 2))$observation, c(suit = 2, rank = 7))
+  steps <- rollout(cards, policy_random(), seed = 1, steps = TRUE)$steps
+  expect_true(all(c("suit", "rank", "action_suit", "action_rank") %in% names(steps)))
+  expect_output(print(cards), "observations: .*: `suit`, `rank`\n.*actions: .*: `suit`, `rank`")
+})

@@ -301,3 +301,12 @@ test_that("a float32 is looked at as Python will have it", {
   expect_true(space_contains(space, 0.418879032135))
   expect_false(space_contains(space, 0.4188791))
 })
+
+test_that("a space draws and checks values by Gymnasium's names, too", {
+  space <- space_box(c(a = 0, b = 1), 2)
+  expect_identical(with_generator(new_generator(1), space$sample()),
+                   with_generator(new_generator(1), space_sample(space)))
+  expect_true(space$contains(c(0, 1)))
+  expect_false(space$contains(c(0, 0)))
+  expect_null(space$nothing)
+})
