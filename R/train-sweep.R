@@ -11,7 +11,7 @@
 #'
 #' The best setting is the one with the highest interquartile mean. If trainings stop at a target,
 #' it is the one with which most runs reached it, or, of equal ones, the one with the smallest
-#' median of steps; there is none if no run reached it.
+#' median of steps; there is none if no run reached it, or if several are equal.
 #'
 #' With `folder` each run is kept in a file. After an interrupt, a crash or an error, the same call
 #' resumes with the missing runs. You may add settings.
@@ -84,7 +84,9 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   ))
   done <- Filter(Negate(is.null), tuned$trainings)
   comparison <- if (length(done)) rlang::exec(compare_trainings, !!!done, seed = 1)
-  best <- if (!is.null(comparison)) best_setting(comparison)
+  best <- if (!is.null(comparison)) best_settings(comparison)
+  # Nothing says which of equal ones is the best.
+  if (length(best) != 1L) best <- NULL
   reported <- if (!is.null(report_seeds) && !is.null(best) && !tuned$interrupted) {
     train(agents[best], report_seeds)
   }
@@ -226,14 +228,27 @@ sweep_results <- function(results, runs, jobs, names, elapsed, interrupted) {
   )
 }
 
-best_setting <- function(comparison) {
+# The names of the best settings: several if they are equal, none if no run reached the target.
+best_settings <- function(comparison) {
   table <- comparison$table
   if (comparison$by == "scores") {
     table <- table[table$statistic == "iqm", ]
-    table$training[[which.max(table$value)]]
+    return(table$training[which(table$value == max(table$value, -Inf, na.rm = TRUE))])
+  }
+  # A median that fewer than half have reached is NA.
+  median <- ifelse(is.na(table$median), Inf, table$median)
+  share <- table$reached / table$runs
+  first <- order(-share, median)[[1L]]
+  best <- share == share[[first]] & median == median[[first]]
+  table$training[best & table$reached > 0L]
+}
+
+no_best_text <- function(comparison) {
+  equal <- if (!is.null(comparison)) best_settings(comparison)
+  if (length(equal)) {
+    paste0("none, equal are ", paste(equal, collapse = "; "), ". More `seeds` may tell")
   } else {
-    first <- order(-table$reached / table$runs, table$median)[[1L]]
-    if (table$reached[[first]] > 0L) table$training[[first]]
+    "none, no run reached the target"
   }
 }
 
@@ -267,7 +282,7 @@ print.gym_sweep <- function(x, ...) {
       paste0(count_of(nrow(failed), "run"), " failed, the first, ", failed$setting[[1L]], ": ",
              sub("\n.*", "", failed$error[[1L]]))
     },
-    paste0("Best: ", x$best %||% "none, no run reached the target"),
+    paste0("Best: ", x$best %||% no_best_text(x$comparison)),
     if (!is.null(x$reported)) {
       c(paste0("Reporting seeds: ", numbers_text(x$report_seeds), ", which chose nothing"),
         paste0("  ", trainings_lines(x$reported)[-(1:2)]))

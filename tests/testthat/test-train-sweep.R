@@ -110,6 +110,21 @@ test_that("no setting is the best where no run reached the target", {
   expect_output(print(sweep), "Best: none, no run reached the target", fixed = TRUE)
 })
 
+test_that("of equal settings none is the best, and the print names them", {
+  by_steps <- function(reached, median) {
+    list(by = "steps", table = data.frame(training = c("a", "b", "c"), runs = 4,
+                                          reached = reached, median = median))
+  }
+  expect_identical(best_settings(by_steps(c(4, 4, 3), c(50, 60, 10))), "a")
+  expect_identical(best_settings(by_steps(c(4, 4, 3), c(50, 50, 10))), c("a", "b"))
+  expect_identical(best_settings(by_steps(c(1, 0, 1), NA)), c("a", "c"))
+  expect_identical(best_settings(by_steps(c(0, 0, 0), NA)), character())
+  by_scores <- list(by = "scores", table = data.frame(
+    training = c("a", "b", "a"), statistic = c("iqm", "iqm", "mean"), value = c(3, 3, 9)
+  ))
+  expect_match(no_best_text(by_scores), "none, equal are a; b. More `seeds` may tell", fixed = TRUE)
+})
+
 test_that("the curves of a sweep are those of its settings", {
   curves <- learning_curves(sweep_fake())
   expect_setequal(curves$training, c("noise = 0.1, candidates = 2", "noise = 1, candidates = 2"))
