@@ -16,8 +16,17 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
   space <- policy$observation_space
   if (length(space$shape) > 1L) {
     gym_abort(
-      paste0("Agents that follow gradients need observations that are vectors; those of ",
-             env_text(policy), " are of ", format(space), "."),
+      c(paste0("Agents that follow gradients need observations that are vectors; those of ",
+               env_text(policy), " are of ", format(space), "."),
+        i = if (startsWith(policy$env_id %||% "", "ALE/")) {
+          paste0("`obs_type = \"ram\"` observes the memory, 128 numbers, as in `learn_ppo(\"",
+                 policy$env_id, "\", obs_type = \"ram\", total_steps = 1e6)`.")
+        },
+        if (length(space$shape) == 3L) {
+          c(i = paste("`env <- gym_wrap(gym_wrap(env, \"GrayscaleObservation\"),",
+                      "\"ResizeObservation\", shape = c(32, 32))` makes small grey pictures."))
+        },
+        i = "`gym_wrap(env, \"FlattenObservation\")` makes vectors, with which it can learn."),
       class = "gym_error_argument", argument = "env", call = NULL
     )
   }

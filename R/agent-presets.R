@@ -128,10 +128,7 @@ make_and_train <- function(make, frame, ...) {
       if (is.null(preset)) list() else preset_arguments(preset)
     )
   }
-  # The preset's `top` was meant for another number of directions, or another version.
-  if (any(c("directions", "version") %in% own)) arguments$top <- NULL
-  if ("population" %in% own) arguments$elite <- NULL
-  arguments[own] <- given[own]
+  arguments <- replace_arguments(arguments, given[own])
   agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
   training <- c(given[setdiff(names(given), of_agent)], dots[names(dots) %in% of_training])
   # The user's budget replaces the preset's, and that of the earlier training.
@@ -145,22 +142,42 @@ make_and_train <- function(make, frame, ...) {
   if (is.null(preset) && !budget) {
     abort_no_budget(preset_hints(env, kwargs), frame)
   }
-  if (!is.null(preset)) {
-    own <- c("episodes", "eval_every", "max_steps", if (!budget) "total_steps")
-    from_preset <- setdiff(intersect(own, names(preset)), names(training))
-    training[from_preset] <- preset[from_preset]
-  }
+  training <- preset_training(preset, training, budget)
   if (!is.null(preset) && !goes_on) {
     training$policy <- training$policy %||% preset_policy(preset, agent)
     inform_of_preset(preset, env)
-    agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
-    agent$preset$changed <- intersect(names(given), c(names(preset), "policy", "iterations"))
+    agent <- with_preset(agent, preset, names(given))
   }
   left <- setdiff(intersect(names(defaults), of_training), names(training))
   training[left] <- defaults[left]
   naming_own_call(
     rlang::exec("train_agent", agent, env, !!!training, !!!kwargs), "train_agent", frame
   )
+}
+
+# The arguments of an agent, of which the user's replace others. The preset's `top` was meant for
+# another number of directions, or another version.
+replace_arguments <- function(arguments, given) {
+  if (any(c("directions", "version") %in% names(given))) arguments$top <- NULL
+  if ("population" %in% names(given)) arguments$elite <- NULL
+  arguments[names(given)] <- given
+  arguments
+}
+
+# The arguments of training, with those of the preset that the user has not given. The user's budget
+# replaces the preset's.
+preset_training <- function(preset, training, budget) {
+  own <- c("episodes", "eval_every", "max_steps", if (!budget) "total_steps")
+  from_preset <- setdiff(intersect(own, names(preset)), names(training))
+  training[from_preset] <- preset[from_preset]
+  training
+}
+
+# The agent, which keeps for provenance() where its settings are from.
+with_preset <- function(agent, preset, given) {
+  agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
+  agent$preset$changed <- intersect(given, c(names(preset), "policy", "iterations"))
+  agent
 }
 
 preset_hints <- function(env, kwargs) {

@@ -146,7 +146,7 @@ check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env
     gym_abort(
       c(paste0("`", given[[1L]], "` is for an environment given by its id, but this ",
                environment_label(env), " was made before."),
-        i = did_you_mean(given[[1L]], c("seed", "episodes", "max_steps", "steps")) %||%
+        i = did_you_mean(given[[1L]], arguments_of(passed_on_by(given[[1L]]))) %||%
           "Give its id instead, or pass the argument to `gym_make()`."),
       class = "gym_error_argument", argument = given[[1L]], call = call
     )

@@ -161,16 +161,37 @@ explain_unknown_argument <- function(cnd, given, call) {
   if (!name %in% given) {
     return()
   }
+  passed <- c(passed_on_by(name), list(gym_make = gym_make))
   # The last one is an argument of all environments.
-  choices <- c(setdiff(names(formals(gym_make)), c("env_id", "...")), "max_episode_steps")
+  choices <- c(arguments_of(passed), "max_episode_steps")
   gym_abort(
     c(
-      paste0("Neither `gym_make()` nor the environment has an argument `", name, "`."),
-      i = did_you_mean(name, choices) %||% "See the environment's documentation for its arguments."
+      paste0("Neither `", names(passed)[[1L]], "()` nor the environment has an argument `", name,
+             "`."),
+      i = did_you_mean(name, choices) %||%
+        paste0("`", names(passed)[[1L]], "()` has ", quoted_names(arguments_of(passed[1L])),
+               "; see the environment's documentation for those of its own.")
     ),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
     status = cnd$status, code = cnd$code, argument = name, call = call
   )
+}
+
+#' Find the functions that passed an argument on in their `...`
+#' @return A list of exported functions with their names, the one that the user called first.
+#' @noRd
+passed_on_by <- function(name) {
+  exported <- mget(getNamespaceExports(topenv()), topenv(), "function", list(NULL))
+  passed <- lapply(seq_len(sys.nframe() - 1L), function(at) {
+    f <- sys.function(at)
+    passes <- "..." %in% names(formals(f)) && name %in% evalq(...names(), sys.frame(at))
+    if (passes) Filter(function(one) identical(one, f), exported)
+  })
+  unlist(passed)
+}
+
+arguments_of <- function(functions) {
+  setdiff(unlist(lapply(functions, function(f) names(formals(f)))), c("env_id", "env", "x", "..."))
 }
 
 server_env <- R6Class(

@@ -192,7 +192,8 @@ refuse_argument <- function(strange, known, id, from, call) {
   if (length(strange)) {
     gym_abort(
       c(paste0(id, " has no argument `", strange[[1L]], "`."),
-        i = did_you_mean(strange[[1L]], known) %||% paste0("Its arguments are ", from, ".")),
+        i = did_you_mean(strange[[1L]], c(known, arguments_of(passed_on_by(strange[[1L]])))) %||%
+          paste0("Its arguments are ", from, ".")),
       class = "gym_error_argument", argument = strange[[1L]], call = call
     )
   }

@@ -127,7 +127,11 @@ check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::calle
   named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
   if (!named && !is_playable(x) && !has_vector_env_method(x)) {
     must <- "the id of an environment or an environment made by `gym_make()`"
-    abort_argument(x, must, arg, call)
+    hint <- if (inherits(x, c("gym_training", "gym_rollout")) && length(x$env_id)) {
+      paste0("The environment comes first, then what plays in it: `\"", x$env_id,
+             "\", training`.")
+    }
+    abort_argument(x, must, arg, call, hint)
   }
   invisible(x)
 }

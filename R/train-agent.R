@@ -17,7 +17,9 @@
 #' count as steps of the training.
 #'
 #' Without a step limit, by the environment or `max_steps`, the policy is not evaluated before the
-#' first iteration: an untrained policy might never end an episode.
+#' first iteration: an untrained policy might never end an episode. Later evaluations then cut off
+#' an episode after ten times the mean length of an iteration's episodes, of the longest so far, but
+#' not before 1,000 steps. A message says when this happens.
 #'
 #' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
 #' exactly, without playing. These evaluations have 0 episodes and a standard error of 0. In a large
@@ -128,7 +130,8 @@
 #'   `"training.rds"`.
 #' @param resume Resume from the file if it exists? `TRUE`, the default, or `FALSE`, which starts
 #'   again and replaces it.
-#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param progress Show a progress bar? By default in interactive sessions only. Without one, a
+#'   training with more than a minute to go says after a few seconds how long it may take.
 #' @param num_envs,num_workers The number of sub-environments, and of processes that run them, as
 #'   for [rollout()]. A learner plays in one sub-environment by default, see [agent_observe()].
 #' @param model Let a learner sample from the model in R, if the environment is given by its id and
@@ -219,6 +222,9 @@ training_job <- function(given, kwargs, client, call) {
   check_spelling(names(kwargs), names(formals(train_agent)), budget, call)
   solved_by <- check_choice(given$solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
   search <- solved_by == "candidate"
+  make <- sub("^gym_", "", class(given$agent)[[1L]])
+  check_not_of_agent(names(kwargs), settings_of(given$agent),
+                     paste0("it goes into its parentheses, as in `", make, "(%s = )`"), call)
   agent <- given$agent <- agent_to_train(given$agent, given$policy, search, call)
   online <- learns_online(agent)
   check_flag(given$model, arg = "model", call = call)

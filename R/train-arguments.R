@@ -46,6 +46,19 @@ check_no_steps <- function(names, call) {
   }
 }
 
+# Otherwise it, too, would be taken for one of the environment.
+check_not_of_agent <- function(names, of_agent, place, call) {
+  own <- intersect(names, of_agent)
+  if (length(own)) {
+    gym_abort(
+      c(paste0("`", own[[1L]], "` is an argument of the agent: ", sprintf(place, own[[1L]]), "."),
+        i = paste0("For an environment with an argument `", own[[1L]], "`, call `gym_make()` ",
+                   "first.")),
+      class = "gym_error_argument", argument = own[[1L]], call = call
+    )
+  }
+}
+
 # A misspelt argument would be taken for one of the environment. A name that only resembles another
 # may really be one: it is refused only if training cannot start anyway.
 check_spelling <- function(names, choices, can_begin, call) {

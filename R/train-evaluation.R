@@ -127,8 +127,27 @@ play_evaluation <- function(state, vector_env, settings, policy, episodes, final
   before <- last_training_seed + if (final) half - 1 else 0
   history <- new_history(1L, episodes, streams)
   history$draw_seeds <- function(n) as.integer(before + sample.int(half - 1, n, replace = TRUE))
-  play_batches(
-    vector_env, history, function(which) policy, max_steps = settings$max_steps %||% Inf
-  )
-  evaluate_episodes(episodes_table(history$batches), policy)
+  limit <- evaluation_limit(state, vector_env, settings)
+  play_batches(vector_env, history, function(which) policy, max_steps = limit)
+  episodes <- episodes_table(history$batches)
+  cut_off <- sum(episodes$length >= limit)
+  if (is.null(settings$max_steps) && cut_off && !isTRUE(state$told_limit)) {
+    state$told_limit <- TRUE
+    rlang::inform(
+      c(i = paste0("An evaluation cut off ", cut_off, " of ", count_of(nrow(episodes), "episode"),
+                   " after ", count_of(limit, "step"), "; `max_steps` sets another limit.")),
+      class = "gym_message_cut_off"
+    )
+  }
+  evaluate_episodes(episodes, policy)
+}
+
+# Without a limit a policy might never end an episode, such as one that never starts a game of
+# Breakout. See ?train_agent.
+evaluation_limit <- function(state, vector_env, settings) {
+  if (!is.null(settings$max_steps) || !is.null(vector_env$spec$max_episode_steps)) {
+    return(settings$max_steps %||% Inf)
+  }
+  longest <- max(0, vapply(state$history, `[[`, 0, "mean_length"))
+  max(1000, ceiling(10 * longest))
 }

@@ -249,9 +249,12 @@ reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return 
 training_progress <- function(settings, state, progress, frame = parent.frame()) {
   by_steps <- is.null(settings$iterations)
   unit <- if (by_steps) "Step" else if (settings$search) "Round" else "Iteration"
-  bar <- progress_bar(
-    settings$iterations %||% settings$total_steps, unit, shown = progress, frame = frame
-  )
+  total <- settings$iterations %||% settings$total_steps
+  bar <- progress_bar(total, unit, shown = progress, frame = frame)
+  # A script has no bar: after a while it says once how long the training may take.
+  told <- begun <- progress
+  started <- proc.time()[["elapsed"]]
+  before <- if (by_steps) state$steps else state$iteration
   show <- function(episodes = 0) {
     finished <- if (by_steps) {
       min(state$steps, settings$total_steps)
@@ -259,10 +262,52 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
       state$iteration + episodes %/% settings$episodes
     }
     bar(finished, if (settings$search) best_note(state) else iteration_note(state))
+    elapsed <- proc.time()[["elapsed"]] - started
+    told <<- told || inform_of_pace(finished - before, total - before, unit, elapsed)
   }
-  if (settings$search) state$report <- show
+  state$report <- if (settings$search) {
+    show
+  } else {
+    function(episodes) {
+      # The first iteration may be long.
+      elapsed <- proc.time()[["elapsed"]] - started
+      if (!begun && state$iteration == 0L) begun <<- inform_of_start(episodes, elapsed)
+    }
+  }
   if (state$iteration > 0L) show()
   show
+}
+
+# In seconds: when a training without a bar is told of, and how much must then be left.
+pace_after <- 5
+pace_left <- 60
+
+# These return whether they have told.
+inform_of_start <- function(episodes, elapsed) {
+  tells <- elapsed >= pace_after && prints_times()
+  if (tells) {
+    rlang::inform(
+      c(i = paste0("Training has begun: ", count_of(episodes, "episode"),
+                   " of the first iteration in ", seconds_text(elapsed), ".")),
+      class = "gym_message_pace"
+    )
+  }
+  tells
+}
+
+inform_of_pace <- function(finished, total, unit, elapsed) {
+  left <- elapsed * (total / finished - 1)
+  tells <- finished > 0 && elapsed >= pace_after && left >= pace_left && prints_times()
+  if (tells) {
+    rlang::inform(
+      c(i = paste0("Trained for ", whole_number_text(finished), " of ",
+                   count_of(total, lower_case(unit)), " in ", seconds_text(elapsed),
+                   "; at this rate the rest takes ", seconds_text(left), "."),
+        i = "`progress = TRUE` shows a bar."),
+      class = "gym_message_pace"
+    )
+  }
+  tells
 }
 
 best_note <- function(state) {

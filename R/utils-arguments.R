@@ -219,10 +219,11 @@ are_whole_numbers <- function(x) {
 are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 else FALSE
 are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
 
-abort_argument <- function(x, must, arg, call) {
+abort_argument <- function(x, must, arg, call, hint = NULL) {
   gym_abort(
     c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
-      i = if (is_integer64(x)) "With bit64 attached, `as.numeric()` makes a number of R's own."),
+      i = if (is_integer64(x)) "With bit64 attached, `as.numeric()` makes a number of R's own.",
+      i = hint),
     class = "gym_error_argument",
     argument = arg,
     value = x,

@@ -47,8 +47,29 @@ prints_times <- function() !isFALSE(getOption("gym.print_seconds"))
 # A name without the characters that people confuse.
 plain_name <- function(x) gsub("[._]", "", lower_case(x))
 
-# The choice that `name` is probably a misspelling of; character(0) for none.
+# The names of arguments in Stable-Baselines3, RLlib and textbooks, in plain form, and ours.
+other_names <- list(
+  alpha = "learning_rate", lr = "learning_rate", eta = "learning_rate", stepsize = "learning_rate",
+  gamma = "discount", discountfactor = "discount", discount = "gamma", discountrate = "discount",
+  gaelambda = "lambda", eps = "epsilon", explorationrate = "epsilon",
+  nsteps = c("batch_steps", "n"), rolloutsteps = "batch_steps", trainbatchsize = "batch_steps",
+  batchsize = "batch", minibatchsize = "batch", nepochs = "epochs", numepochs = "epochs",
+  cliprange = "clip", clipparam = "clip", entcoef = "entropy", entropycoeff = "entropy",
+  vfcoef = "value_weight", buffersize = "memory", memorysize = "memory", tau = "target_rate",
+  targetupdateinterval = "target_every", totaltimesteps = "total_steps", timesteps = "total_steps",
+  nenvs = "num_envs", ncpus = "num_workers", ncores = "num_workers",
+  n = c("episodes", "iterations"), times = "episodes", nepisodes = "episodes",
+  numepisodes = "episodes", nevalepisodes = "eval_episodes", evalfreq = "eval_every",
+  popsize = "population", sigma = "noise"
+)
+
+# The choice that `name` is another library's name of, or probably a misspelling; character(0) for
+# none.
 nearest_name <- function(name, choices) {
+  ours <- intersect(other_names[[plain_name(name)]], choices)
+  if (length(ours)) {
+    return(ours[[1L]])
+  }
   ordered <- function(x) {
     vapply(strsplit(x, ""), function(letters) paste(sort(letters), collapse = ""), "")
   }

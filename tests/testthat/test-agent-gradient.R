@@ -281,7 +281,10 @@ test_that("agents refuse policies, spaces and settings that they cannot learn wi
   refused(agent_dqn(), policy_network(c(NA, NA), output = NA), box, "each action of a Discrete")
   refused(agent_dqn(), greedy, fake_environment(), "a value for each of 2 actions")
   picture <- fake_environment(observation_space = space_box(0, 1, shape = c(2, 2)))
-  refused(agent_ppo(), NULL, picture, "observations that are vectors")
+  refused(agent_ppo(), NULL, picture, "gym_wrap\\(env, \"FlattenObservation\"\\)")
+  screen <- fake_environment(observation_space = space_box(0, 255, shape = c(4, 4, 3)),
+                             id = "ALE/Breakout-v5")
+  refused(agent_dqn(), NULL, screen, "obs_type = \"ram\".*ResizeObservation")
   expect_error(agent_ppo(batch = 99, batch_steps = 64), "`batch` must be at most",
                class = "gym_error_argument")
   expect_error(agent_dqn(batch = 99, memory = 64), class = "gym_error_argument")

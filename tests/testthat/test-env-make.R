@@ -86,3 +86,18 @@ test_that("print() and summary() of an environment say what there is to know", {
                   space_discrete(1), space_discrete(1))
   expect_output(print(summary(walk)), "step limit: +none\n.*solved at: +no threshold")
 })
+
+test_that("an argument that nobody has is explained with those of the function that was called", {
+  client <- test_client()
+  refused <- function(code, words) expect_error(code, words, class = "gym_error_http_400")
+  refused(learn_ppo("CartPole-v1", lr = 1e-3, total_steps = 100, client = client),
+          "Neither `learn_ppo.*Did you mean `learning_rate`")
+  refused(learn_q("Taxi-v4", alpha = 0.1, total_steps = 10, client = client),
+          "Did you mean `learning_rate`")
+  refused(rollout("CartPole-v1", policy_random(), n = 3, client = client),
+          "Neither `rollout.*Did you mean `episodes`")
+  refused(learn_ppo("CartPole-v1", wombat = 1, total_steps = 100, client = client),
+          "`learn_ppo\\(\\)` has `policy`, `batch_steps`")
+  expect_error(learn_ppo("CartPole-v1", lr = 1e-3, client = client), "mean `learning_rate`")
+  expect_error(rollout(fake_environment(), policy_random(), n = 3), "mean `episodes`")
+})

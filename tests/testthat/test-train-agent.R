@@ -578,3 +578,60 @@ test_that("what is misspelt, or not there, is refused with what there is", {
     class = "gym_error_argument"
   )
 })
+
+test_that("an argument of the agent given to training says where it goes", {
+  expect_error(train_agent(agent_ppo(), fake_environment(), batch_steps = 9, iterations = 1),
+               "`agent_ppo(batch_steps = )`", fixed = TRUE, class = "gym_error_argument")
+  expect_error(sweep_agent(agent_ppo, fake_environment(), data.frame(gamma = 1), 1:5,
+                           batch_steps = 9, iterations = 1),
+               "`data.frame(batch_steps = )`", fixed = TRUE, class = "gym_error_argument")
+})
+
+test_that("a training in the place of the environment says that this comes first", {
+  trained <- quiet_training(agent_hill_climb(), iterations = 1)
+  for (f in list(evaluate_policy, rollout)) {
+    expect_error(f(trained), "environment comes first.*\"Fake-v0\", training",
+                 class = "gym_error_argument")
+  }
+})
+
+test_that("an evaluation that never ends its episodes is cut off, and says so", {
+  never <- fake_environment(ends = function(seed, step, action) step == 3L && seed <= 2^30)
+  trained <- NULL
+  expect_message(
+    trained <- train_agent(agent_hill_climb(), never, iterations = 1, eval_episodes = 2,
+                           target = Inf, seed = 1),
+    "cut off 2 of 2 episodes after 1,000 steps", class = "gym_message_cut_off"
+  )
+  expect_identical(trained$final$steps, 2000L)
+  state <- list(history = list(list(mean_length = 300), list(mean_length = 120)))
+  expect_identical(evaluation_limit(state, never, list()), 3000)
+  expect_identical(evaluation_limit(state, never, list(max_steps = 7)), 7)
+  expect_identical(evaluation_limit(state, list(spec = list(max_episode_steps = 9)), list()), Inf)
+})
+
+test_that("a long training without a progress bar says that it has begun and what it may take", {
+  expect_false(inform_of_pace(10, 1e5, "Step", 1))
+  expect_false(inform_of_pace(1e5 - 1, 1e5, "Step", 100))
+  expect_message(inform_of_pace(1000, 1e5, "Step", 6),
+                 "1,000 of 100,000 steps in 6.0 s; at this rate the rest takes 10 min")
+  local_binding("pace_after", 0)
+  local_binding("pace_left", 0)
+  told <- function(...) {
+    classes <- character()
+    withCallingHandlers(
+      train_agent(agent_hill_climb(), fake_environment(), iterations = 3, eval_episodes = 2,
+                  target = Inf, ...),
+      message = function(cnd) {
+        if (inherits(cnd, "gym_message_pace")) classes <<- c(classes, conditionMessage(cnd))
+        rlang::cnd_muffle(cnd)
+      }
+    )
+    classes
+  }
+  expect_match(told(progress = FALSE), "Training has begun|Trained for 1 of 3 iterations")
+  expect_length(told(progress = FALSE), 2)
+  expect_length(told(progress = TRUE), 0)
+  withr::local_options(gym.print_seconds = FALSE)
+  expect_length(told(progress = FALSE), 0)
+})

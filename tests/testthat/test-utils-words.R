@@ -42,3 +42,20 @@ test_that("in a Turkish locale words of English keep their dots", {
   expect_identical(lower_first("It is"), "it is")
   expect_identical(nearest_name("INSIDE", "inside"), "inside")
 })
+
+test_that("other libraries' names of arguments lead to ours", {
+  ppo <- names(formals(learn_ppo))
+  expect_identical(nearest_name("lr", ppo), "learning_rate")
+  expect_identical(nearest_name("n_steps", ppo), "batch_steps")
+  expect_identical(nearest_name("batch_size", ppo), "batch")
+  expect_identical(nearest_name("discount", ppo), "gamma")
+  expect_identical(nearest_name("alpha", names(formals(learn_q))), "learning_rate")
+  expect_identical(nearest_name("n", names(formals(rollout))), "episodes")
+  # A name of ours is not replaced by one that is there, too.
+  expect_identical(nearest_name("stepsize", names(formals(agent_ars))), "step_size")
+  # Each leads to an argument that some function has.
+  exported <- mget(getNamespaceExports("gym"), asNamespace("gym"), "function", list(NULL))
+  known <- unlist(lapply(Filter(is.function, exported), function(f) names(formals(f))))
+  expect_identical(setdiff(unlist(other_names), known), character())
+  expect_identical(names(other_names), plain_name(names(other_names)))
+})

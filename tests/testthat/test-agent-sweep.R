@@ -23,13 +23,15 @@ test_that("each setting is trained with each seed, as train_agent() does", {
 })
 
 test_that("tuning seeds choose, reporting seeds are others, and the print says which", {
-  sweep <- sweep_fake(report_seeds = 11:15)
+  # More candidates are better.
+  settings <- data.frame(noise = 1, candidates = c(1, 8))
+  sweep <- sweep_fake(settings, report_seeds = 11:15)
   iqm <- subset(as.data.frame(sweep), statistic == "iqm")
   expect_identical(sweep$best, iqm$setting[[which.max(iqm$value)]])
   expect_identical(names(sweep$reported$trainings), as.character(11:15))
   expect_output(print(sweep), "Tuning seeds: 1 to 5, which chose the setting", fixed = TRUE)
   expect_output(print(sweep), "Reporting seeds: 11 to 15, which chose nothing", fixed = TRUE)
-  expect_output(print(sweep_fake()), "No reporting seeds")
+  expect_output(print(sweep_fake(settings)), "No reporting seeds")
   expect_error(sweep_fake(report_seeds = 5:9), "Seed 5", class = "gym_error_argument")
 })
 
@@ -108,6 +110,7 @@ test_that("no setting is the best where no run reached the target", {
   expect_null(sweep$best)
   expect_null(sweep$reported)
   expect_output(print(sweep), "Best: none, no run reached the target", fixed = TRUE)
+  expect_output(print(sweep), "Tuning seeds: 1 to 5\n", fixed = TRUE)
 })
 
 test_that("of equal settings none is the best, and the print names them", {
@@ -145,4 +148,23 @@ test_that("the runs of a sweep go to the workers of the plan", {
   there <- suppressWarnings(sweep(), classes = "gym_warning_seeds")
   expect_identical(as.data.frame(there), as.data.frame(here))
   expect_identical(coef(there$trainings[[2]]), coef(here$trainings[[2]]))
+})
+
+test_that("a sweep tunes the agent that the trainer with its preset trains, and says so", {
+  client <- test_client()
+  expect_message(
+    sweep <- suppressWarnings(sweep_agent(
+      agent_ars, "CartPole-v1", data.frame(directions = 2, noise = 0.3), seeds = 1:2,
+      iterations = 1, eval_episodes = 2, target = Inf, client = client
+    ), classes = "gym_warning_seeds"),
+    class = "gym_message_preset"
+  )
+  one <- suppressMessages(search_ars(
+    "CartPole-v1", directions = 2, noise = 0.3, iterations = 1, eval_episodes = 2, target = Inf,
+    seed = 2, client = client
+  ))
+  own <- sweep$trainings[[1L]]$trainings[["2"]]
+  expect_identical(coef(own), coef(one))
+  expect_identical(provenance(own)$preset$origin, "ours")
+  expect_setequal(provenance(own)$preset$changed, provenance(one)$preset$changed)
 })

@@ -13,6 +13,10 @@
 #' it is the one with which most runs reached it, or, of equal ones, the one with the smallest
 #' median of steps; there is none if no run reached it, or if several are equal.
 #'
+#' Where `agent` is one of this package's and the environment has a preset for it
+#' ([agent_presets()]), `settings` replace its values: the sweep tunes the agent, and the policy,
+#' that [learn_ppo()] and others would train. A message says so.
+#'
 #' With `folder` each run is kept in a file. After an interrupt, a crash or an error, the same call
 #' resumes with the missing runs. You may add settings.
 #'
@@ -66,16 +70,21 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   check_sweep(agent, settings, seeds, report_seeds, folder, call)
   settings <- as.data.frame(settings)
   settings$setting <- setting_names(settings)
+  dots <- list(...)
+  place <- "give it as a column of `settings`, as in `data.frame(%s = )`"
+  check_not_of_agent(names(dots), names(formals(agent)), place, call)
+  preset <- sweep_preset(agent, env, dots)
+  if (!is.null(preset)) inform_of_preset(preset, env)
   agents <- lapply(seq_len(nrow(settings)), function(row) {
     arguments <- lapply(settings[row, names(settings) != "setting", drop = FALSE], `[[`, 1L)
-    tryCatch(rlang::exec(agent, !!!arguments), error = identity)
+    tryCatch(sweep_agent_of(agent, arguments, preset, names(dots)), error = identity)
   })
   names(agents) <- settings$setting
   failed <- vapply(agents, inherits, NA, "condition")
   if (all(failed)) rlang::cnd_signal(agents[[1L]])
   if (!is.null(folder)) dir.create(folder, showWarnings = FALSE, recursive = TRUE)
   train <- function(agents, seeds) {
-    sweep_runs(agents, env, plain_numbers(seeds), list(...), folder, progress, client, call)
+    sweep_runs(agents, env, plain_numbers(seeds), dots, preset, folder, progress, client, call)
   }
   tuned <- train(agents[!failed], seeds)
   runs <- rbind(tuned$runs, data.frame(
@@ -157,19 +166,39 @@ setting_names <- function(settings) {
   make.unique(texts, " ")
 }
 
+# The preset that the agent's own trainer, such as learn_ppo(), would use.
+sweep_preset <- function(agent, env, dots) {
+  kinds <- unique(agent_presets()$agent)
+  kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))), kinds)
+  if (length(kind)) {
+    find_preset(kind, env, dots[setdiff(names(dots), names(formals(train_agent)))])
+  }
+}
+
+sweep_agent_of <- function(make, arguments, preset, given) {
+  if (is.null(preset)) {
+    return(rlang::exec(make, !!!arguments))
+  }
+  agent <- rlang::exec(make, !!!replace_arguments(preset_arguments(preset), arguments))
+  with_preset(agent, preset, c(names(arguments), given))
+}
+
 #' Train agents with several seeds, all at once
 #' @param agents A list of agents with the names of their settings.
 #' @return A list: `trainings`, those of each agent, `runs`, a table, and `interrupted`.
 #' @noRd
-sweep_runs <- function(agents, env, seeds, dots, folder, progress, client, call) {
+sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, client, call) {
   started <- proc.time()[["elapsed"]]
   of_training <- setdiff(names(formals(train_agent)), c("agent", "env", "...", "client"))
   given <- lapply(formals(train_agent)[of_training], eval, environment(train_agent))
-  given[intersect(names(dots), of_training)] <- dots[intersect(names(dots), of_training)]
+  budget <- any(c("iterations", "total_steps") %in% names(dots))
+  training <- preset_training(preset, dots[intersect(names(dots), of_training)], budget)
+  given[names(training)] <- training
   kwargs <- dots[setdiff(names(dots), of_training)]
   jobs <- lapply(names(agents), function(name) {
     own <- c(list(agent = agents[[name]], env = env), given)
     own["seeds"] <- list(seeds)
+    if (!is.null(preset)) own$policy <- own$policy %||% preset_policy(preset, own$agent)
     if (!is.null(folder)) {
       own$checkpoint <- file.path(folder, paste0(gsub("[^A-Za-z0-9.=-]+", "_", name), ".rds"))
     }
@@ -245,7 +274,9 @@ best_settings <- function(comparison) {
 
 no_best_text <- function(comparison) {
   equal <- if (!is.null(comparison)) best_settings(comparison)
-  if (length(equal)) {
+  if (is.null(comparison)) {
+    "none, no run was finished"
+  } else if (length(equal)) {
     paste0("none, equal are ", paste(equal, collapse = "; "), ". More `seeds` may tell")
   } else {
     "none, no run reached the target"
@@ -276,7 +307,8 @@ print.gym_sweep <- function(x, ...) {
   cat(
     paste0("Sweep of ", count_of(nrow(x$settings), "setting"),
            if (x$interrupted) ", interrupted: the same call goes on where it has a folder"),
-    paste0("Tuning seeds: ", numbers_text(x$seeds), ", which chose the setting"),
+    paste0("Tuning seeds: ", numbers_text(x$seeds),
+           if (!is.null(x$best)) ", which chose the setting"),
     if (!is.null(x$comparison)) comparison_lines(x$comparison, pairs = FALSE),
     if (nrow(failed)) {
       paste0(count_of(nrow(failed), "run"), " failed, the first, ", failed$setting[[1L]], ": ",
