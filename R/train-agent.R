@@ -373,25 +373,6 @@ train_in <- function(vector_env, run, progress, call) {
   run_training(state, vector_env, settings, progress, call)
 }
 
-# A learner explores, so it reaches all states of a model. With a given policy it may not.
-check_training_ends <- function(vector_env, settings, online, call) {
-  check_has_end(vector_env, settings$max_steps %||% Inf)
-  model <- settings$model
-  limit <- settings$max_steps %||% model$spec$max_episode_steps
-  if (!online || is.null(model) || !is.null(limit) || inherits(settings$agent, "gym_agent_td")) {
-    return()
-  }
-  state <- state_without_end(model)
-  if (!is.null(state)) {
-    gym_abort(
-      c(paste0("An episode of ", environment_label(vector_env), " that reaches state ", state,
-               " never ends."),
-        i = "Give `max_steps`, after which an episode is cut off, or let the model end there."),
-      class = "gym_error_argument", argument = "max_steps", call = call
-    )
-  }
-}
-
 # Weights that are drawn when the environment's sizes become known depend on the training's seed, so
 # a policy that draws them is drawn again.
 bind_with_seed <- function(policy, vector_env, seed, call) {

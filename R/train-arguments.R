@@ -96,6 +96,25 @@ unknown_arguments_hint <- function(names, agent) {
   )
 }
 
+# A learner explores, so it reaches all states of a model. With a given policy it may not.
+check_training_ends <- function(vector_env, settings, online, call) {
+  check_has_end(vector_env, settings$max_steps %||% Inf)
+  model <- settings$model
+  limit <- settings$max_steps %||% model$spec$max_episode_steps
+  if (!online || is.null(model) || !is.null(limit) || inherits(settings$agent, "gym_agent_td")) {
+    return()
+  }
+  state <- state_without_end(model)
+  if (!is.null(state)) {
+    gym_abort(
+      c(paste0("An episode of ", environment_label(vector_env), " that reaches state ", state,
+               " never ends."),
+        i = "Give `max_steps`, after which an episode is cut off, or let the model end there."),
+      class = "gym_error_argument", argument = "max_steps", call = call
+    )
+  }
+}
+
 check_trained_policy <- function(policy, agent, call) {
   if (learns_online(agent)) {
     if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
