@@ -35,7 +35,9 @@ test_that("an id with a model is learned from the model, unless the environment 
 })
 
 test_that("a model without a limit asks for one", {
-  expect_error(learn("CliffWalking-v1"), "Give `max_steps`", class = "gym_error_argument")
+  # Without the preset of learn_q(), which has a limit.
+  expect_error(train_agent(agent_q(), "CliffWalking-v1", iterations = 2, client = test_client()),
+               "Give `max_steps`", class = "gym_error_argument")
   expect_false(from_model("CliffWalking-v1", model = FALSE))
 })
 
