@@ -359,6 +359,8 @@ check_open <- function(env, call = rlang::caller_env()) {
 abort_closed <- function(hint, call, end = "closed") {
   gym_abort(
     c(paste0("This environment was ", end, "."), i = hint),
-    class = "gym_error_argument", argument = "env", call = call
+    # One that ended with its server is an answer that did not come, too.
+    class = c(if (end != "closed") "gym_error_connection", "gym_error_argument"),
+    argument = "env", call = call
   )
 }

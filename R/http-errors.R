@@ -97,11 +97,14 @@ connection_hint <- function(base, reason) {
       "`httr::set_config(httr::config(cainfo = \"FILE\"))` adds your own."
     ))
   }
-  if (!is.null(the_session$servers[[base]])) {
-    return(paste(
-      "This session started it; see `gym_server_log()`.",
-      "If it has ended, `gym_make()` starts another."
-    ))
+  server <- the_session$servers[[base]]
+  if (!is.null(server)) {
+    return(if (server$process$is_alive()) {
+      "This session started it; see `gym_server_log()`. If it has ended, `gym_make()` starts another."
+    } else {
+      paste("It has ended, and its environments with it. `gym_server_log()` has its last lines,",
+            "`gym_make()` starts another.")
+    })
   }
   place <- local_place(base)
   if (is.null(place)) {

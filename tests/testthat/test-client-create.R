@@ -82,7 +82,7 @@ test_that("a server that is killed or stopped in a call is noticed", {
 
   kill_later(pid, 0.3)
   error <- expect_error(env$step(1), class = "gym_error_connection")
-  expect_match(conditionMessage(error), "`gym_make()` starts another", fixed = TRUE)
+  expect_match(conditionMessage(error), "made on a server that has ended", fixed = TRUE)
 })
 
 test_that("a timeout of httr's goes before the client's, after a repeat too", {

@@ -50,16 +50,16 @@ test_that("an environment whose server has ended is not open, and says so", {
   for (env in list(single, several, wrapped)) env$reset()
   gym_server_stop(server)
   # Before anything else has noticed it.
-  expect_error(single$step(1), "on a server that has ended", class = "gym_error_argument")
+  expect_error(single$step(1), "on a server that has ended", class = "gym_error_connection")
   for (env in list(single, several, wrapped)) {
     expect_false(env$is_open)
-    expect_error(env$reset(), "on a server that has ended", class = "gym_error_argument")
+    expect_error(env$reset(), "on a server that has ended", class = "gym_error_connection")
     expect_silent(env$close())
   }
   for (call in list(env_reset, env_render, env_action_space_sample, env_monitor_close)) {
-    expect_error(call(server, classic), "was made on a server that", class = "gym_error_argument")
+    expect_error(call(server, classic), " has ended", class = "gym_error_connection")
   }
-  expect_error(env_step(server, classic, 1), "a server that has ended", class = "gym_error_argument")
+  expect_error(env_step(server, classic, 1), " has ended", class = "gym_error_connection")
   expect_silent(env_close(server, classic))
   expect_output(print(single), "<gym_env: CartPole-v1, made on a server that has ended>")
   expect_output(print(wrapped), "TransformReward, made on a server that has ended>")
