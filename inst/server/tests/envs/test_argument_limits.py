@@ -77,7 +77,7 @@ def test_mujocos_arguments_are_bounded(refused, kwargs):
 def test_ataris_own_vector_environment_gets_no_argument_that_hangs_it(refused, name):
     pytest.importorskip("ale_py")
     how = {"num_envs": 2, "vectorization_mode": "vector_entry_point", "kwargs": {name: 0}}
-    assert f"{name} must be at least" in refused("ALE/Pong-v5", **how)
+    assert f"'{name}' must be at least" in refused("ALE/Pong-v5", **how)
 
 
 def test_arguments_are_only_so_long(refused, create):
