@@ -399,7 +399,7 @@ test_that("what cannot be learned so is refused", {
     expect_error(code, text, class = "gym_error_argument", fixed = TRUE)
   }
   refused(agent_q(discount = 1.5), "`discount` must be a number above 0 and at most 1")
-  refused(agent_q(learning_rate = 2), "`learning_rate` must be a number from 0 to 1")
+  refused(agent_q(learning_rate = 2), "`learning_rate` must be a number above 0 and at most 1")
   refused(agent_q(epsilon = -1), "`epsilon` must be a number from 0 to 1, or a function")
   refused(agent_q(features = 3), "`features` must be NULL")
   refused(agent_sarsa(n = 2, lambda = 0.5), "not both")
