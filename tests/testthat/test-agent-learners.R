@@ -404,7 +404,7 @@ test_that("what cannot be learned so is refused", {
   refused(agent_q(features = 3), "`features` must be NULL")
   refused(agent_sarsa(n = 2, lambda = 0.5), "not both")
   refused(agent_td(3), "`policy` must be a policy")
-  refused(agent_q(learning_rate = NULL), "`learning_rate` must be a number from 0 to 1")
+  refused(agent_q(learning_rate = NULL), "`learning_rate` must be a number above 0 and at most 1")
   refused(agent_q(temperature = 0), "`temperature` must be a number of at least")
   refused(begins(started(agent_q(epsilon = function(taken) 2)), 0L),
           "The function `epsilon` must return a number from 0 to 1, and after 0 steps")

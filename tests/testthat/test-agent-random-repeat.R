@@ -122,6 +122,8 @@ test_that("bad arguments are refused before anything is made, naming argument an
 
 test_that("a progress bar is shown when asked for and nothing is said otherwise", {
   env <- function() scripted_environment(rep(1, 60))
+  # R goes on to warn when an option that was not set is taken away: it is set to FALSE first.
+  withr::local_options(warnPartialMatchDollar = FALSE)
   withr::local_options(warnPartialMatchDollar = TRUE)
   expect_silent(search_repeat(env(), rounds = 1, target = 9, seeds = 1:2, progress = FALSE))
   withr::local_options(cli.progress_show_after = 0, cli.dynamic = FALSE, cli.num_colors = 1)
