@@ -22,8 +22,8 @@
 #'   steps so far such as [schedule_linear()]. The default is 0.01.
 #' @param gamma The discount, a number from 0 to 1. The default is 0.99.
 #' @param baseline Use a baseline? `TRUE`, the default, or `FALSE`.
-#' @param value_learning_rate The step size of Adam for the baseline, as `learning_rate`. The default
-#'   is 0.01.
+#' @param value_learning_rate The step size of Adam for the baseline, as `learning_rate`. The
+#'   default is 0.01.
 #' @param value_updates The number of steps of Adam for the baseline after each iteration, a whole
 #'   number. The default is 20.
 #' @param entropy The weight of the policy's entropy relative to the return, a number or a function

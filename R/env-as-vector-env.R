@@ -98,7 +98,8 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_client(client, call = call)
   make <- function(num_envs, ...) {
     rlang::exec(
-      make_unseeded, env_id = x, !!!arguments, num_envs = num_envs, ..., client = client, call = call
+      make_unseeded, env_id = x, !!!arguments, num_envs = num_envs, ..., client = client,
+      call = call
     )
   }
   single <- frames || length(remembering(wrapper_names(noted_wrappers(x))))

@@ -28,10 +28,11 @@
 #'   [gym_wrap()] builds such a list with a pipe.
 #' @param vectorization_mode How the sub-environments run. `"vector_entry_point"` uses the
 #'   environment's own vector implementation if it has one, like CartPole, whose is the fastest from
-#'   some eight sub-environments on. `"sync"` runs them one after the other in the server's process. `"async"` runs groups of them
-#'   in worker processes, which is worthwhile if a step takes long. `"sync"` and `"async"` give the
-#'   same results. `NULL`, the default, uses the environment's own implementation if it supports the
-#'   other arguments, and otherwise depends on `num_workers`. Only with `num_envs`.
+#'   some eight sub-environments on. `"sync"` runs them one after the other in the server's process.
+#'   `"async"` runs groups of them in worker processes, which is worthwhile if a step takes long.
+#'   `"sync"` and `"async"` give the same results. `NULL`, the default, uses the environment's own
+#'   implementation if it supports the other arguments, and otherwise depends on `num_workers`. Only
+#'   with `num_envs`.
 #' @param autoreset_mode What happens to a sub-environment after the end of its episode.
 #'   `"NextStep"`: the next step resets it and ignores its action and reward. `"SameStep"`: the same
 #'   step resets it, and its last observation is in the info, see [env_step()]. `"Disabled"`: call
@@ -179,9 +180,9 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' @param action An action of the action space: a whole number for Discrete (or its meaning, such as
 #'   `"push left"`, if the printed environment shows meanings), a numeric vector or array for Box.
 #'   The names of its numbers must be known, such as `"main engine"` or, as in a table of steps,
-#'   `"action_1"`, in any order. [space_sample()] lists all kinds. A vector environment takes one for
-#'   each sub-environment, in the form of the observations of [env_reset()]: a vector for Discrete, a
-#'   matrix with a row for each for a Box of one dimension.
+#'   `"action_1"`, in any order. [space_sample()] lists all kinds. A vector environment takes one
+#'   for each sub-environment, in the form of the observations of [env_reset()]: a vector for
+#'   Discrete, a matrix with a row for each for a Box of one dimension.
 #' @param render Show the environment? `TRUE` or `FALSE`, the default. The first `TRUE` opens the
 #'   environment's page, see [env_watch()]. While somebody watches, each such step takes real time.
 #'   [env_render()] returns a frame.

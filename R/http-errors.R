@@ -100,7 +100,8 @@ connection_hint <- function(base, reason) {
   server <- the_session$servers[[base]]
   if (!is.null(server)) {
     return(if (server$process$is_alive()) {
-      "This session started it; see `gym_server_log()`. If it has ended, `gym_make()` starts another."
+      paste("This session started it; see `gym_server_log()`. If it has ended, `gym_make()` starts",
+            "another.")
     } else {
       paste("It has ended, and its environments with it. `gym_server_log()` has its last lines,",
             "`gym_make()` starts another.")

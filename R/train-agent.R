@@ -59,8 +59,8 @@
 #' training, with the same result as an uninterrupted one. A finished training is returned at once.
 #' `iterations`, `total_steps` and `target` may differ, except in a search: a larger budget or a
 #' higher target goes on with a finished training. (A network with given sizes draws its weights
-#' when it is made: make it after [set.seed()], or with the sizes `NA`.) `readRDS()` of the file prints
-#' what it is.
+#' when it is made: make it after [set.seed()], or with the sizes `NA`.) `readRDS()` of the file
+#' prints what it is.
 #'
 #' # Going on with a trained agent
 #'

@@ -20,7 +20,8 @@ one_step <- function() {
 agents <- function() {
   list(
     agent_ppo(20, batch = 10), agent_reinforce(20),
-    agent_dqn(learning_starts = 5, min_episodes = 8), agent_ars(2), agent_cem(6), agent_hill_climb(), agent_random(2), agent_q(),
+    agent_dqn(learning_starts = 5, min_episodes = 8), agent_ars(2), agent_cem(6),
+    agent_hill_climb(), agent_random(2), agent_q(),
     agent_q(double = TRUE), agent_q(planning = 2), agent_sarsa(), agent_monte_carlo(),
     agent_td(policy_random()), agent_actor_critic()
   )
