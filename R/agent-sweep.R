@@ -37,7 +37,7 @@
 #' @param x A sweep.
 #' @param row.names,optional Not used.
 #' @param main The title of the picture. `NULL`, the default, names the environment.
-#' @param xlab,ylab,xlim,ylim As for [plot.gym_rollout()].
+#' @param xlab,ylab,xlim,ylim,guide As for [plot.gym_rollout()].
 #' @return An object of class `gym_sweep`, a list with the elements
 #'   \describe{
 #'     \item{settings}{The settings, with a column `setting`, their names.}
