@@ -42,28 +42,20 @@ def make_instance(
             and ``LocalInstance``.
     """
     with logs.hearing() as warnings:
-        instance = _make(config, allowed_modules, max_num_envs, renderer, undo, reservation)
+        if config.num_envs is None:
+            env = make.make_env(config, allowed_modules, reservation)
+            undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
+            reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
+            wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
+            instance: LocalInstance = SingleInstance(wrapped, config, renderer)
+        else:
+            sub_envs, mode = make_vector_env(
+                config, allowed_modules, max_num_envs, renderer, reservation
+            )
+            undo.push(_closing_quietly(sub_envs.close))
+            instance = VectorInstance(sub_envs, mode, config, renderer)
     instance.warnings = warnings
     return instance
-
-
-def _make(
-    config: EnvConfig,
-    allowed_modules: Collection[str],
-    max_num_envs: int,
-    renderer: RenderThread,
-    undo: contextlib.ExitStack,
-    reservation: MemoryReservation,
-) -> LocalInstance:
-    if config.num_envs is None:
-        env = make.make_env(config, allowed_modules, reservation)
-        undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
-        reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
-        wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
-        return SingleInstance(wrapped, config, renderer)
-    sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer, reservation)
-    undo.push(_closing_quietly(sub_envs.close))
-    return VectorInstance(sub_envs, mode, config, renderer)
 
 
 def _closing_quietly(close: Callable[[], object]) -> Callable[..., None]:

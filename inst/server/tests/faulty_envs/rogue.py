@@ -1,11 +1,8 @@
 """An environment that ends its process, or attacks it."""
 
-import contextlib
 import ctypes
 import os
-import pickle
 import signal
-import stat
 import time
 
 import numpy as np
@@ -96,24 +93,3 @@ class Rogue(Counting):
     def never_returns(self):
         # No other thread of its process runs meanwhile.
         ctypes.PyDLL(None).sleep(3600)
-
-    def forges(self):
-        for descriptor in range(3, 64):
-            with contextlib.suppress(OSError):
-                os.fstat(descriptor)
-                if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
-                    os.write(descriptor, FORGED)
-
-
-class Unpickled:
-    """Creates a file when it is unpickled, which the test looks for."""
-
-    def __reduce__(self):
-        return open, (os.environ.get("FORGED_FILE", os.devnull), "w")
-
-
-_FORGED = pickle.dumps(Unpickled())
-
-
-# In the format of the server's own messages.
-FORGED = len(_FORGED).to_bytes(8, "little") + _FORGED
