@@ -47,20 +47,35 @@ def ask_and_leave(server, seconds, seeds, **how):
         time.sleep(seconds)
 
 
-def test_an_episode_that_hangs_is_ended_and_named(quick):
-    client = quick(max_call_seconds=0.5, max_rollout_processes=1).test_client()
-    how = {"env_id": "faulty_envs:Hanging-v0", "max_steps": 5}
-    refusal = refused(client, [4, 5], **how)
+def test_an_episode_that_hangs_is_ended_and_named(quick, gate, eventually):
+    # Without a limit, because starting a process takes long on a busy machine.
+    app = quick(max_call_seconds=0, max_rollout_processes=1)
+    how = {"env_id": "faulty_envs:Gated-v0", "kwargs": gate.kwargs, "max_steps": 5}
+    answer = in_background(lambda: refused(app.test_client(), [4, 5], **how))
+    eventually(gate.is_reached)
+    # The first look only notes how many steps there were.
+    app._rollouts.kill_overdue(0.1)
+    time.sleep(0.2)
+    app._rollouts.kill_overdue(0.1)
+    refusal = answer()
     assert refusal["code"] == "call_too_long"
     assert "seed 4" in refusal["message"]
-    assert len(roll_out(client, range(9), **LAKE)[0]["return"]) == 9
+    assert len(roll_out(app.test_client(), range(9), **LAKE)[0]["return"]) == 9
 
 
-def test_steps_that_go_on_are_no_hang(quick):
-    client = quick(max_call_seconds=0.3, max_rollout_processes=1).test_client()
+def test_steps_that_go_on_are_no_hang(quick, eventually):
+    app = quick(max_call_seconds=0, max_rollout_processes=1)
+    rollouts = app._rollouts
     how = {"env_id": "faulty_envs:Counting-v0", "kwargs": {"seconds": 0.05, "length": 30}}
-    arrays, _ = roll_out(client, [1], max_steps=30, **how)
-    assert arrays["length"].tolist() == [30]
+    answer = in_background(lambda: roll_out(app.test_client(), [1], max_steps=30, **how))
+    eventually(lambda: any(one.process and one.process.progress[0] for one in rollouts._players))
+    player = rollouts._players[0]
+    rollouts.kill_overdue(60)
+    # As if its last step had been too long ago, and then comes another one.
+    steps, player.steps_since = player.steps, player.steps_since - 100
+    eventually(lambda: player.process.progress[0] > steps)
+    rollouts.kill_overdue(60)
+    assert answer()[0]["length"].tolist() == [30]
 
 
 def test_an_episode_that_ends_its_process_each_time_is_refused(client):
