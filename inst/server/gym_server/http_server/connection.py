@@ -213,6 +213,10 @@ class Connection:
         else:
             self._send(head, body)
         self._sends_no_store = False
+        if response.take_over is not None:
+            self._busy = False
+            self._socket.settimeout(None)
+            response.take_over(self._socket, request.rest)
         return keep
 
     def _send(self, data: bytes, more: bytes = b"") -> None:
@@ -346,17 +350,20 @@ class Connection:
 # In capitals, as in Flask's responses, and as classic clients show them.
 _STATUS_LINES = {one.value: f"HTTP/1.1 {one.value} {one.phrase.upper()}" for one in HTTPStatus}
 _NO_CONTENT = HTTPStatus.NO_CONTENT.value
+_SWITCHING = HTTPStatus.SWITCHING_PROTOCOLS.value
 
 
 def _head(response: Response, keep: bool) -> bytes:
     """Return the status line and headers."""
-    head = f"{_STATUS_LINES[response.status]}\r\nContent-Type: {response.content_type}\r\n"
-    if response.status != _NO_CONTENT:
-        head += f"Content-Length: {len(response.body)}\r\n"
+    head = f"{_STATUS_LINES[response.status]}\r\n"
+    if response.status != _SWITCHING:
+        head += f"Content-Type: {response.content_type}\r\n"
+        if response.status != _NO_CONTENT:
+            head += f"Content-Length: {len(response.body)}\r\n"
     for name, value in response.headers:
         head += f"{name}: {value}\r\n"
     head += f"Date: {_date(int(time.time()))}\r\n"
-    if not keep:
+    if not keep and response.status != _SWITCHING:
         head += "Connection: close\r\n"
     return f"{head}\r\n".encode("latin-1")
 

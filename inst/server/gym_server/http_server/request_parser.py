@@ -41,6 +41,7 @@ class Request:
         keep_alive: whether the client wants to keep the connection.
         was_checked: whether the application was asked to admit the request.
         refusal: a response that is sent instead of calling the application.
+        rest: what follows it on the connection, if it asks for a WebSocket.
     """
 
     def __init__(self) -> None:
@@ -55,6 +56,7 @@ class Request:
         self.keep_alive = False
         self.was_checked = False
         self.refusal: Response | None = None
+        self.rest = b""
 
     def same_head(self, other: Request) -> bool:
         """Return whether another request has the same head."""
@@ -199,6 +201,13 @@ class RequestParser:
         the head is parsed again without the headers that ask for it.
         """
         request = self._complete.pop()
+        if request.method == "GET" and (b"upgrade", b"websocket") in request.headers:
+            # Whatever the answer is, no other request follows.
+            request.rest = rest
+            request.keep_alive = False
+            self._complete.append(request)
+            self._parser = HttpRequestParser(self)
+            return b""
         if request.method == "CONNECT":
             self._request = request
             self._end_with(self._refuse(400, "this is no proxy"))

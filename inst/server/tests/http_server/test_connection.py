@@ -22,6 +22,12 @@ LARGE = 2**24
 ROOM = 2**18
 
 
+def echo(client, data):
+    while data:
+        client.sendall(data)
+        data = client.recv(100)
+
+
 class App:
     """Returns as many bytes as the path says."""
 
@@ -30,6 +36,9 @@ class App:
 
     def respond(self, environ):
         environ["wsgi.input"].read()
+        if environ.get("HTTP_UPGRADE") == "websocket" and environ["PATH_INFO"] == "/echo":
+            headers = (("Upgrade", "websocket"), ("Connection", "Upgrade"))
+            return Response(101, b"", headers=headers, take_over=echo)
         return Response(200, bytes(int(environ["PATH_INFO"].strip("/") or 0)))
 
     def admit(self, environ):
@@ -131,6 +140,43 @@ def test_a_client_that_is_recognized_may_be_silent_for_long(converse):
     time.sleep(1)
     client.sendall(GET % b"")
     assert b"200 OK" in read_head(client)
+
+
+# Other protocols -----------------------------------------------------------------------------
+
+WEBSOCKET = b"GET %s HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\r\n"
+
+
+def test_a_route_may_take_over_the_socket(converse):
+    client, thread = converse()
+    client.sendall(WEBSOCKET % b"/echo" + b"ab")
+    head = read_head(client)
+    while not head.endswith(b"ab"):
+        head += client.recv(100)
+    assert head.startswith(b"HTTP/1.1 101 ")
+    assert b"Content-" not in head and b"close" not in head
+    client.sendall(b"cd")
+    assert client.recv(100) == b"cd"
+    client.shutdown(socket.SHUT_WR)
+    assert client.recv(100) == b""
+    thread.join(10)
+
+
+def test_a_stop_ends_what_a_socket_that_was_taken_over_receives(converse):
+    connections = []
+    client, thread = converse(seen=connections.append)
+    client.sendall(WEBSOCKET % b"/echo" + b"ab")
+    while b"ab" not in client.recv(100):
+        pass
+    connections[0].stop(half_sent=False)
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+def test_a_websocket_that_is_declined_is_answered_as_any_request(converse):
+    client, _ = converse()
+    client.sendall(WEBSOCKET % b"/3")
+    assert read_head(client).startswith(b"HTTP/1.1 200 ")
 
 
 # Clients that are not recognized -------------------------------------------------------------
