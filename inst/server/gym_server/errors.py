@@ -24,6 +24,7 @@ _STATUS = {
     "instance_memory_closed": 410,
     "upload_closed": 410,
     "body_too_large": 413,
+    "upgrade_required": 426,
     "monitors_full": 429,
     "too_many_instances": 429,
     "too_many_keys": 429,
@@ -44,6 +45,7 @@ _HEADERS = {
     "busy_receiving": (("Retry-After", "5"),),
     "too_many_keys": (("Retry-After", "60"),),
     "too_many_rollouts": (("Retry-After", "1"),),
+    "upgrade_required": (("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")),
     "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
 }
 

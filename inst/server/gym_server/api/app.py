@@ -15,8 +15,10 @@ from flask import Flask
 
 from gym_server.api.access import Access, Guard
 from gym_server.api.calls import Services
-from gym_server.api.endpoint import Endpoint, failure
+from gym_server.api.endpoint import Endpoint
 from gym_server.api.exactly_once import ExactlyOnce
+from gym_server.api.failures import failure
+from gym_server.api.open_streams import OpenStreams
 from gym_server.api.routes import BLUEPRINTS, ROUTES
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
@@ -97,6 +99,7 @@ class GymApp(Flask):
             self._monitor_root,
             config.stop if config.client_stop else _refuse_to_stop,
             Watchers(config.limits.max_watchers),
+            OpenStreams(self._exactly_once, config.max_body_bytes),
             watch_keys if config.access.token is not None else None,
         )
         self._endpoints = {

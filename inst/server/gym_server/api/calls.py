@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
+from gym_server.api.open_streams import OpenStreams
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
@@ -28,6 +30,7 @@ class Services:
         monitor_root: where monitors may write.
         stop: asks the server to stop after answering the requests in progress.
         watchers: counts the watchers that wait for a frame.
+        streams: steps and resets by WebSockets.
         watch_keys: the keys that open watch pages; None if pages need no key.
     """
 
@@ -36,6 +39,7 @@ class Services:
     monitor_root: MonitorRoot
     stop: Callable[[], None]
     watchers: Watchers
+    streams: OpenStreams
     watch_keys: WatchKeys | None = None
 
 
@@ -51,6 +55,7 @@ class Call(NamedTuple):
         url: the requested path.
         accept: the Accept header.
         is_connected: returns whether the client still waits for a response.
+        environ: the whole request, as a WSGI environ.
     """
 
     services: Services
@@ -61,6 +66,7 @@ class Call(NamedTuple):
     url: str = ""
     accept: str = ""
     is_connected: Callable[[], bool] = lambda: True
+    environ: Mapping[str, Any] = MappingProxyType({})
 
     @property
     def instance(self) -> Instance:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from hashlib import blake2b
 
 from werkzeug.datastructures import MIMEAccept
-from werkzeug.exceptions import MethodNotAllowed
 from werkzeug.http import parse_accept_header
 from werkzeug.wrappers import Request
 
 from gym_server.api.calls import IS_CONNECTED, Call, Services
-from gym_server.api.exactly_once import ExactlyOnce, Outcome
+from gym_server.api.exactly_once import ExactlyOnce, Outcome, kept_body
+from gym_server.api.failures import failure
 from gym_server.api.routing import Match, Route
-from gym_server.errors import GymServerError, answer_to, body_too_large
+from gym_server.errors import GymServerError, body_too_large
 from gym_server.protocol import bodies
 from gym_server.protocol.answers import JSON_FORM, AnswerForm, response_to
 from gym_server.protocol.fields import REQUEST, RequestId, read
@@ -23,10 +22,6 @@ from gym_server.response import JSON, Response
 
 def _always() -> bool:
     return True
-
-
-# Longer bodies are stored as a digest, which takes 40 us for one of this size.
-_KEPT_BYTES = 2**16
 
 
 class Endpoint:
@@ -82,13 +77,14 @@ class Endpoint:
             match.path,
             accept,
             environ.get(IS_CONNECTED, _always),
+            environ,
         )
         if request_id is None:
             return self._perform(call, None).response
         # Requests that end an instance are stored with those that create one, so that they are
         # never refused because the instance has too many keys.
         used_id = None if route.ends_instance else match.variables.get("instance_id")
-        asked = raw if len(raw) <= _KEPT_BYTES else blake2b(raw).digest()
+        asked = kept_body(raw)
         content = (match.path, asked, tensors is not None, call.form)
         perform = partial(self._perform, call, request_id)
         try:
@@ -110,18 +106,6 @@ class Endpoint:
             # store.
             did_nothing = isinstance(error, GymServerError) and error.did_nothing
             return Outcome(failure(error, request_id), not did_nothing, instance_id)
-
-
-def failure(error: BaseException, request_id: RequestId | None = None) -> Response:
-    """Return the response for an error."""
-    status, body = answer_to(error)
-    response = response_to(body, request_id, status)
-    if isinstance(error, GymServerError):
-        return response._replace(headers=error.headers)
-    if isinstance(error, MethodNotAllowed):
-        allowed = ", ".join(sorted(error.valid_methods or ()))
-        return response._replace(headers=(("Allow", allowed),))
-    return response
 
 
 def _query(environ: dict) -> dict[str, str | list[str]]:

@@ -6,11 +6,13 @@ from gym_server.api import (
     rollout_routes,
     server_routes,
     space_routes,
+    stream_routes,
     watch_routes,
 )
 
 BLUEPRINTS = (
     env_routes.bp,
+    stream_routes.bp,
     space_routes.bp,
     monitor_routes.bp,
     rollout_routes.bp,

@@ -20,6 +20,7 @@ from gym_server.viewing.watchable import Watchable
 
 if TYPE_CHECKING:
     import numpy as np
+    from gymnasium.spaces import Space
 
 Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
@@ -37,11 +38,15 @@ class Instance(Watchable):
         instance_id: set when the instance is listed; "" before.
         env_id: an id that creates the same environment again.
         config: what its client chose.
+        single_action_space: the action space of one sub-environment.
+        single_observation_space: the observation space of one sub-environment.
         viewer: shows it to watchers.
         steps: the number of steps of its sub-environments.
     """
 
     env_id: str
+    single_action_space: Space
+    single_observation_space: Space
 
     def __init__(self, config: EnvConfig, renderer: RenderThread) -> None:
         """Prepare the lock and the viewer.

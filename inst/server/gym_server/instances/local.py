@@ -41,8 +41,6 @@ class LocalInstance(Instance):
 
     Attributes:
         gym_env: Gymnasium's environment or vector environment.
-        single_action_space: the action space of one sub-environment.
-        single_observation_space: the observation space of one sub-environment.
         drawing: draws and closes the environment.
         statistics: the statistics of its episodes.
         warnings: Gymnasium's warnings about what was made.
@@ -52,8 +50,6 @@ class LocalInstance(Instance):
         autoreset_mode: when a sub-environment whose episode ended is reset; None as above.
     """
 
-    single_action_space: Space
-    single_observation_space: Space
     drawing: Drawing
     statistics: EpisodeStatistics | VectorEpisodeStatistics
     warnings: Sequence[str] = ()

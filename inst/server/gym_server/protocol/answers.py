@@ -133,8 +133,8 @@ def _dumps_tensors(
             tensors[name] = Tensor.of(others[name])
     elif reward is not None:
         tensors["reward"] = Tensor("F64", (), struct.pack("<d", reward))
-        tensors["terminated"] = _FLAGS[others["terminated"]]
-        tensors["truncated"] = _FLAGS[others["truncated"]]
+        tensors["terminated"] = FLAGS[others["terminated"]]
+        tensors["truncated"] = FLAGS[others["truncated"]]
     metadata = [_metadata("info", others["info"])]
     if request_id is not None:
         metadata.append(_request_metadata(request_id))
@@ -163,4 +163,4 @@ def _request_beginning(key: str) -> bytes:
     return _metadata("request", {"key": key, "number": 0})[: -len(b'0}"')]
 
 
-_FLAGS = {False: Tensor("BOOL", (), b"\0"), True: Tensor("BOOL", (), b"\1")}
+FLAGS = {False: Tensor("BOOL", (), b"\0"), True: Tensor("BOOL", (), b"\1")}

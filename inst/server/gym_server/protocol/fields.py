@@ -115,18 +115,24 @@ class RequestId(NamedTuple):
 _KEY = re.compile("[!-~]{1,64}")
 
 
-def _request_id(value: object) -> RequestId:
-    key = value.get("key") if isinstance(value, dict) else None
+def _key(value: object) -> str:
     # A header echoes it, which allows only these characters.
-    if not isinstance(value, dict) or not isinstance(key, str) or _KEY.fullmatch(key) is None:
+    if not isinstance(value, str) or _KEY.fullmatch(value) is None:
         raise ValueError
-    return RequestId(key, integer(value.get("number")))
+    return value
+
+
+def _request_id(value: object) -> RequestId:
+    if not isinstance(value, dict):
+        raise ValueError
+    return RequestId(_key(value.get("key")), integer(value.get("number")))
 
 
 ANYTHING = Kind("any JSON value", lambda value: value, empty_is_absent=False)
 BOOLEAN = Kind("true or false", boolean)
 TEXT = Kind("a string", text)
 OBJECT = Kind("an object", json_object)
+KEY = Kind("1 to 64 visible ASCII characters", _key)
 REQUEST_ID = Kind(
     'an object of a "key" (1 to 64 visible ASCII characters) and a "number" (an integer, '
     "0 or greater)",

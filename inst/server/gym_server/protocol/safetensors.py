@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -152,17 +152,27 @@ def _headed(header: bytes) -> tuple[bytes, bytes]:
 _encode = json.JSONEncoder(separators=(",", ":")).encode
 
 
-# All steps of an environment have the same.
-@lru_cache(maxsize=256)
-def _layout(entries: tuple[tuple[str, str, tuple[int, ...]], ...]) -> tuple[list[str], bytes]:
-    """Return the order of tensors in a file, and the header before its metadata."""
-    header: dict[str, object] = {}
+def places(entries: Iterable[tuple[str, str, tuple[int, ...]]]) -> dict[str, dict[str, Any]]:
+    """Return the header of a file without metadata, in the order of its tensors.
+
+    Args:
+        entries: the name, dtype and shape of each tensor.
+    """
+    header: dict[str, dict[str, Any]] = {}
     begin = 0
     # The widest dtypes first, so that all tensors are aligned.
     for name, dtype, shape in sorted(entries, key=lambda entry: -_DTYPES[entry[1]].itemsize):
         end = begin + math.prod(shape) * _DTYPES[dtype].itemsize
         header[name] = {"dtype": dtype, "shape": shape, "data_offsets": (begin, end)}
         begin = end
+    return header
+
+
+# All steps of an environment have the same.
+@lru_cache(maxsize=256)
+def _layout(entries: tuple[tuple[str, str, tuple[int, ...]], ...]) -> tuple[list[str], bytes]:
+    """Return the order of tensors in a file, and the header before its metadata."""
+    header = places(entries)
     beginning = _encode(header)[:-1] + "," if header else "{"
     return list(header), beginning.encode("ascii")
 
@@ -206,10 +216,15 @@ def _read(raw: bytes) -> TensorFile:
         name: Tensor(place.dtype, place.shape, data[place.begin : place.end])
         for name, place in places.items()
     }
+    check_booleans(tensors)
+    return TensorFile(tensors, metadata)
+
+
+def check_booleans(tensors: Mapping[str, Tensor]) -> None:
+    """Raise ValueError if a boolean is neither 0 nor 1."""
     for name, tensor in tensors.items():
         if tensor.dtype == "BOOL" and np.any(np.frombuffer(tensor.data, np.uint8) > 1):
             raise ValueError(f"tensor {name!r} has booleans that are neither 0 nor 1")
-    return TensorFile(tensors, metadata)
 
 
 def _unique(pairs: list[tuple[str, object]]) -> dict:

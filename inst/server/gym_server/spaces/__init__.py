@@ -36,7 +36,9 @@ from gym_server.spaces.stacking import stack
 from gym_server.spaces.support import describe, parts_of
 from gym_server.spaces.tensor_parts import (
     Rows,
+    Shapes,
     tensor_reader,
+    tensor_shapes,
     tensor_writer,
     travels_as_tensors,
 )
@@ -46,6 +48,7 @@ __all__ = [
     "NotInSpace",
     "Parts",
     "Rows",
+    "Shapes",
     "brief_space",
     "contains",
     "decode",
@@ -58,6 +61,7 @@ __all__ = [
     "parts_of",
     "stack",
     "tensor_reader",
+    "tensor_shapes",
     "tensor_writer",
     "travels_as_tensors",
     "with_wide_boxes",

@@ -47,6 +47,8 @@ class Rows(NamedTuple):
 
 ONE = Rows()
 
+# The dtype and shape of tensors by name.
+Shapes = dict[str, tuple[str, tuple[int, ...]]]
 # Leads to a part of a member.
 Path = tuple[str | int, ...]
 # Adds the parts of a value to the given ones.
@@ -111,6 +113,17 @@ def _put_together(space: Space, name: str, path: Path) -> PutTogether:
         raise refusal
 
     return refuse
+
+
+@singledispatch
+def tensor_shapes(space: Any, name: str) -> Shapes | None:
+    """Return the dtype and shape of each tensor of a member; None if they vary."""
+    if not isinstance(space, ARRAYS):
+        return None
+    try:
+        return {name: (tensor_name(space.dtype), space.shape or ())}
+    except KeyError:
+        return None
 
 
 def _part_name(name: str, key: object) -> str:
@@ -246,7 +259,25 @@ def _take_text(space: Text, name: str, parts: Parts, path: Path) -> object:
         raise
 
 
+@tensor_shapes.register
+def _(space: Discrete, name: str) -> Shapes | None:
+    return {name: (tensor_name(wide_dtype(space)), ())}
+
+
 # Tuple and Dict -----------------------------------------------------------------------------
+
+
+@tensor_shapes.register(Tuple)
+@tensor_shapes.register(Dict)
+def _(space: Any, name: str) -> Shapes | None:
+    keyed = space.spaces.items() if isinstance(space, Dict) else enumerate(space.spaces)
+    shapes: Shapes = {}
+    for key, part in keyed:
+        found = tensor_shapes(part, _part_name(name, key))
+        if found is None:
+            return None
+        shapes |= found
+    return shapes
 
 
 @travels_as_tensors.register

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from front_process import TOKENS, FrontProcess, is_running, write_users
 from raw_http import answered, read_answer, request
+from stream_client import StreamClient
 
 resource = pytest.importorskip("resource", reason="this system has no fronts")
 
@@ -77,6 +78,14 @@ def test_nobody_sees_steps_watches_closes_or_stops_what_another_has(front, event
     assert front.pid_of("ben") != before
     assert front.steps("anna", url) == 200
     front.ask(ANNA, "POST", f"{url}/close/", {})
+
+
+def test_a_stream_passes(front):
+    url, authorization = front.make("anna"), f"Authorization: Bearer {ANNA}"
+    stream = StreamClient(("127.0.0.1", front.port), url, "k", None, authorization)
+    with contextlib.closing(stream):
+        assert stream.step(1)[1] == 200
+        assert stream.step(1)[1] == 200
 
 
 def test_a_wrong_token_and_none_get_one_answer(front):

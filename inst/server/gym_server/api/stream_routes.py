@@ -1,0 +1,51 @@
+"""The route that makes a connection a stream of steps and resets."""
+
+from __future__ import annotations
+
+import uuid
+
+from gym_server.api.calls import Call
+from gym_server.api.routing import INSTANCE, RouteBlueprint
+from gym_server.api.stream import Stream
+from gym_server.api.websocket import accept_key
+from gym_server.errors import GymServerError
+from gym_server.protocol.fields import KEY, Field, Kind
+from gym_server.response import Response
+
+bp = RouteBlueprint("stream")
+
+
+def _order(value: object) -> str:
+    if value != "column":
+        raise ValueError
+    return "column"
+
+
+@bp.declare(
+    "GET",
+    INSTANCE + "stream/",
+    Field("key", KEY),
+    Field("order", Kind('"column"', _order)),
+)
+def env_stream(call: Call) -> Response:
+    """Open a WebSocket for steps and resets."""
+    headers = call.environ
+    key = headers.get("HTTP_SEC_WEBSOCKET_KEY", "")
+    if (
+        headers.get("HTTP_UPGRADE") != "websocket"
+        or headers.get("HTTP_SEC_WEBSOCKET_VERSION") != "13"
+        or not key
+    ):
+        raise GymServerError(
+            "upgrade_required",
+            "A stream is a WebSocket of version 13, and the request does not ask for one",
+            "without a WebSocket, POST to step/ and reset/",
+        )
+    own = call.fields["key"] or uuid.uuid4().hex
+    stream = Stream(call, own, by_column=call.fields["order"] is not None)
+    accepted = (
+        ("Upgrade", "websocket"),
+        ("Connection", "Upgrade"),
+        ("Sec-WebSocket-Accept", accept_key(key)),
+    )
+    return Response(101, b"", "", accepted, stream.serve)
