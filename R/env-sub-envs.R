@@ -104,9 +104,7 @@ check_no_workers <- function(num_workers, call) {
 }
 
 # Codes of errors that may disappear with fewer sub-environments or none.
-fewer_sub_envs_codes <- c(
-  "not_supported", "too_many_sub_envs", "too_much_memory", "unsupported_space"
-)
+fewer_sub_envs_codes <- c("not_supported", "too_much_memory", "unsupported_space")
 
 # Evaluates code that makes an environment. NULL if the server cannot make such sub-environments, or
 # not that many.

@@ -7,13 +7,15 @@ run_server <- paste0(
   "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
 )
 
-# Starts the server with one Python. Returns a description of the running server, or a string with
-# the reason why this Python cannot run it.
-launch_server <- function(python, arguments, timeout, call = rlang::caller_env()) {
+# Starts the server with one Python, and with a token, or `NULL` for what its arguments and the
+# environment variable say. Returns a description of the running server, or a string with the reason
+# why this Python cannot run it.
+launch_server <- function(python, arguments, timeout, token = NULL, call = rlang::caller_env()) {
   log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
   process <- start_python(
-    python, c(arguments, "--own-log", log), stdin = "|", stdout = "|", stderr = log,
+    python, arguments, stdin = "|", stdout = "|", stderr = log,
+    token = token,
     # processx or a forked child would kill the server. Instead the session closes the server's
     # standard input; the server then closes its environments and ends.
     cleanup = FALSE
@@ -38,11 +40,16 @@ launch_server <- function(python, arguments, timeout, call = rlang::caller_env()
   refusal_reason(lines)
 }
 
-# Starts a Python that can import the server; `NULL` if that fails.
-start_python <- function(python, arguments, ...) {
+# Starts a Python that can import the server; `NULL` if that fails. Other accounts cannot read the
+# environment variables of a process, but its arguments.
+start_python <- function(python, arguments, ..., token = NULL) {
+  variables <- server_environment()
+  if (!is.null(token)) {
+    variables[[token_variable]] <- token()
+  }
   with_own_tree_id(tryCatch(
     processx::process$new(
-      python, arguments, ..., env = server_environment(), windows_hide_window = TRUE
+      python, arguments, ..., env = variables, windows_hide_window = TRUE
     ),
     error = function(cnd) NULL
   ))
@@ -112,7 +119,7 @@ own_library_path <- function() {
 }
 
 # Waits for the line by which the server reports that it accepts connections. Returns a list of its
-# address, `url`, and its own `token` from an earlier line; NULL if the process ended first.
+# address, `url`; NULL if the process ended first.
 await_start <- function(process, log, timeout, call) {
   deadline <- now() + timeout
   lines <- character()
@@ -131,7 +138,7 @@ await_start <- function(process, log, timeout, call) {
     if (!is.null(address)) {
       # A server that listens on all addresses is also at the loopback address.
       url <- sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)
-      return(list(url = url, token = as_token(said_after("Token: ", lines), call)))
+      return(list(url = url))
     }
     if (!process$is_incomplete_output()) {
       await_end(process, 5)
@@ -177,11 +184,9 @@ stop_server <- function(server, timeout = 15) {
   }
 }
 
-# Closes the server's standard input, which stops it. The line before says that this session still
-# exists. Without it (the session was killed), the server removes its log by itself.
+# Closes the server's standard input, which stops it.
 close_server_input <- function(server) {
   # It is already closed if an earlier stop was interrupted.
-  try(server$process$write_input("stop\n"), silent = TRUE)
   try(close(server$process$get_input_connection()), silent = TRUE)
 }
 

@@ -30,21 +30,17 @@ is_running <- function(base) {
 #'   * `allow_module = c("a", "b")` names Python modules whose environments may be made.
 #'   * `token_file = "token"` names a file with a token of 16 characters or more, which replaces the
 #'   server's own one.
-#'   * Limits for all clients together (with their defaults): `max_instances` (environments, 1,000),
-#'   `max_num_envs` (sub-environments of one environment, 16,384), `max_total_sub_envs` (four times
-#'   as many), `max_processes` (of environments, 128), `max_rollout_processes` (that play whole
-#'   episodes, one per core), `max_memory_mb` (of all environments, estimated before they are made,
-#'   4,096), `max_monitor_mb` (of all monitors on the disk, 4,096), `max_watchers` (100) and
-#'   `max_body_mb` (of a request, 16).
+#'   * Limits (with their defaults): `max_total_sub_envs` (of all environments, 400,000),
+#'   `max_processes` (of environments, 128), `max_rollout_processes` (that play whole episodes, one
+#'   per core) and `max_memory_mb` (of all environments, estimated before they are made, 4,096).
 #'   * `max_call_seconds` is the time after which a call fails and its environment is removed (300;
 #'   0 for no limit). `idle_minutes` is the time after which an unused environment is removed
 #'   (1,440; 0 for never).
 #'   * `vignette("server", package = "gym")` describes the options of a server for a group:
-#'   `allow_host`, `allow_path`, `no_auth`, `no_shutdown`.
+#'   `allow_host`, `no_auth`.
 #' @param timeout The time for the start, in seconds. The default is 60.
-#' @param token Should the server require its own token? `TRUE` or `FALSE`. It makes the token at
-#'   its start and gives it to this session only, so other accounts of the machine cannot use the
-#'   server. The returned client carries the token, and so does each client that
+#' @param token Should the server require its own token? `TRUE` or `FALSE`. Only this session knows
+#'   it, so other accounts of the machine cannot use the server. The returned client carries the token, and so does each client that
 #'   [create_GymClient()] makes for this address in this session. Other processes, such as another R
 #'   session or clients in other languages, need `FALSE` or a token that they know. The default is
 #'   `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
@@ -120,15 +116,16 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
   }
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
-    if (token && !says_token(options)) "--own-token", server_options(options, call)
+    server_options(options, call)
   )
+  own_token <- if (token && !says_token(options)) new_token(hex(openssl::rand_bytes(32L)))
   refusals <- character()
   # Launches the server with the first Python that can run it, or returns NULL.
   launch_with_first <- function(pythons) {
     for (candidate in pythons) {
-      server <- launch_server(candidate, arguments, timeout, call)
+      server <- launch_server(candidate, arguments, timeout, own_token, call)
       if (is.list(server)) {
-        server$token <- server$token %||% server_token(options, call)
+        server$token <- own_token %||% server_token(options, call)
         return(register_server(server))
       }
       refusals[[candidate]] <<- server
@@ -208,7 +205,7 @@ gym_server_stop <- function(client = NULL) {
 #' Read a server's log
 #'
 #' Return the warnings and errors of a server that this session started, and the output of its
-#' environments. This also works after its end. A log that exceeds 8 MiB is cut to its last MiB.
+#' environments. This also works after its end. The same warning is logged once a minute.
 #'
 #' @inheritParams gym_server_stop
 #' @return A character vector with an element for each line; `character(0)` if there is no output.

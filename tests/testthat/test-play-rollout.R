@@ -271,24 +271,6 @@ test_that("Blackjack: observations with several parts have named columns", {
                "cannot observe <Tuple", class = "gym_error_argument")
 })
 
-test_that("a server that allows fewer sub-environments plays the same in a quarter of them", {
-  skip_unless_all()
-  local_functions(plays_rollouts = function(...) FALSE)
-  server <- local_server(max_num_envs = 8)
-  played <- rollout("CartPole-v1", policy_network(c(4, 1), weights = list(t(1:4))), 30, seed = 1,
-                    client = server)
-  expect_identical(played$episodes$sub_env, rep(1:7, length.out = 30))
-  expect_null(played$num_envs)
-  alone <- rollout(local_env("CartPole-v1"), played$policy, 30, seed = 1)
-  expect_identical(played$episodes$return, alone$episodes$return)
-  one <- local_server(max_num_envs = 1)
-  played <- rollout("CartPole-v1", policy_random(), 3, seed = 1, client = one)
-  expect_identical(played$episodes$sub_env, rep(1L, 3))
-  few <- rollout("CartPole-v1", policy_random(), 5, seed = 1, client = server)
-  expect_identical(few$episodes$sub_env, 1:5)
-  expect_length(env_list_all(server), 0)
-})
-
 test_that("an environment of one's own whose step lacks something is refused at its first step", {
   skip_unless_all()
   making <- function(change) {

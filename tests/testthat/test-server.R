@@ -17,13 +17,19 @@ test_that("a server starts on a free port, has a log and stops", {
 
 test_that("options of the server are written as the command line reads them", {
   expect_identical(
-    server_options(list(max_num_envs = 1e5, log_level = "info", no_auth = TRUE, off = FALSE)),
-    c("--max-num-envs", "100000", "--log-level", "info", "--no-auth")
+    server_options(list(max_memory_mb = 1e5, log_level = "info", no_auth = TRUE, off = FALSE)),
+    c("--max-memory-mb", "100000", "--log-level", "info", "--no-auth")
   )
   expect_identical(
     server_options(list(allow_module = c("a", "b"))),
     c("--allow-module", "a", "--allow-module", "b")
   )
+})
+
+test_that("an option that ended says what replaces it", {
+  skip_if_no_server()
+  expect_error(gym_server_start(no_shutdown = TRUE), "serves one user, who may stop it",
+               class = "gym_error_server_start")
 })
 
 test_that("starting a server leaves R's generator alone", {
@@ -165,7 +171,7 @@ test_that("a server that another session started is not stopped here", {
   )
 })
 
-test_that("the server ends with the R session and leaves no log, also when R is killed", {
+test_that("the server ends with the R session and leaves no log, and ends when R is killed", {
   skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
@@ -184,8 +190,8 @@ test_that("the server ends with the R session and leaves no log, also when R is 
       Sys.sleep(0.1)
     }
     expect_false(pid_runs(pid))
-    expect_false(file.exists(said[[2]]))
-    # R that is killed leaves the folder.
+    # R that is killed leaves its temporary folder.
+    expect_identical(file.exists(said[[2]]), grepl("kill", ending))
     unlink(dirname(said[[2]]), recursive = TRUE)
   }
 })

@@ -16,7 +16,6 @@ _STATUS = {
     "unauthorized": 401,
     "foreign_host": 403,
     "foreign_origin": 403,
-    "shutdown_disabled": 403,
     "not_found": 404,
     "method_not_allowed": 405,
     "request_conflict": 409,
@@ -25,13 +24,11 @@ _STATUS = {
     "upload_closed": 410,
     "body_too_large": 413,
     "upgrade_required": 426,
-    "monitors_full": 429,
     "too_many_instances": 429,
     "too_many_keys": 429,
     "too_many_rollouts": 429,
     "too_many_sub_envs": 429,
     "too_many_processes": 429,
-    "too_many_watchers": 429,
     "too_much_memory": 429,
     "environment_died": 500,
     "environment_error": 500,
@@ -50,7 +47,7 @@ _HEADERS = {
 }
 
 # Errors below 500 that may come after some work was done. Errors from 500 on always may.
-_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory", "monitors_full"})
+_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory"})
 
 # For people: describes the routes. The classic R client shows no error message without this field.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
@@ -211,11 +208,11 @@ def malformed_request(reason: str) -> GymServerError:
 
 
 def body_too_large() -> GymServerError:
-    """Report a body larger than the operator allows."""
+    """Report a body that is too large."""
     return GymServerError(
         "body_too_large",
         "The request's body is larger than this server accepts",
-        "the server's option --max-body-mb sets the limit",
+        "send less at a time",
     )
 
 
@@ -224,7 +221,7 @@ def busy_receiving() -> GymServerError:
     return GymServerError(
         "busy_receiving",
         "This server is receiving as many large requests as it has memory for",
-        "send it again in a few seconds; the server's option --max-body-mb sets the limit",
+        "send it again in a few seconds",
     )
 
 

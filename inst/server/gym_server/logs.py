@@ -12,7 +12,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from types import CodeType, TracebackType
 from typing import TextIO
 
@@ -22,7 +22,8 @@ _log = logging.getLogger("py.warnings")
 
 _LONGEST_TRACEBACK = 20_000
 
-# After a traceback from one place, further ones from there are left out for this long.
+# After a warning, or a traceback from one place, the same is left out for this long. An environment
+# may warn at each step.
 _QUIET_SECONDS = 60.0
 
 _Place = tuple[CodeType, int] | None
@@ -73,6 +74,21 @@ def hear(text: str) -> None:
         _heard.texts.append(text)
 
 
+# When each warning was logged last.
+_warned: dict[str, float] = {}
+
+
+def _is_new(what: Hashable, logged: dict) -> bool:
+    """Return whether something was not logged recently, and note that it is now."""
+    now = time.monotonic()
+    for old in [one for one, at in list(logged.items()) if at <= now - _QUIET_SECONDS]:
+        logged.pop(old, None)
+    is_new = what not in logged
+    if is_new:
+        logged[what] = now
+    return is_new
+
+
 def _show_warning(
     message: Warning | str,
     category: type[Warning],
@@ -82,7 +98,8 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     text = re.sub(r"\x1b\[\d+m", "", str(message))
-    _log.warning("%s:%s: %s: %s", filename, lineno, category.__name__, text)
+    if _is_new(text, _warned):
+        _log.warning("%s:%s: %s: %s", filename, lineno, category.__name__, text)
     if re.match(_GYMNASIUM, str(message)):
         hear(text.removeprefix("WARN: "))
 
@@ -105,11 +122,8 @@ class Formatter(logging.Formatter):
         """Return a traceback, unless one from the same place was logged recently."""
         error: BaseException = ei[1]
         place = _place((error.__cause__ or error).__traceback__)
-        now = time.monotonic()
-        self._logged = {p: at for p, at in self._logged.items() if at > now - _QUIET_SECONDS}
-        if place in self._logged:
+        if not _is_new(place, self._logged):
             return "(The traceback of this place was logged less than a minute ago)"
-        self._logged[place] = now
         # A part is a line of code or the message of an error.
         parts = traceback.TracebackException(*ei).format()
         text = "".join(f"{shortened(part.rstrip(), LONGEST_MESSAGE)}\n" for part in parts)

@@ -114,10 +114,6 @@ class ServerProcess:
             text=True,
         )
         self.first_line = self.process.stdout.readline()
-        self.token = None
-        if self.first_line.startswith("Token: "):
-            self.token = self.first_line.removeprefix("Token: ").strip()
-            self.first_line = self.process.stdout.readline()
         self.port = int(self.first_line.rsplit(":", 1)[1]) if self.first_line else None
 
     def connect(self):
@@ -235,15 +231,11 @@ TOKEN = "correct-horse-battery"
 def attacked(tmp_path_factory):
     """Return one server for all attacks."""
     root = tmp_path_factory.mktemp("attacked")
-    (root / "models").mkdir()
-    (root / "models" / "in.xml").write_text("<mujoco/>")
-    if os.name == "posix":
-        (root / "models" / "out.xml").symlink_to("/etc/passwd")
-    options = {"--monitor-dir": root / "runs", "--allow-path": root / "models"}
     server = ServerProcess(
         *ON_A_FREE_PORT,
-        *(str(word) for option in options.items() for word in option),
+        *("--monitor-dir", str(root / "runs")),
         GYM_SERVER_TOKEN=TOKEN,
+        GYM_SERVER_SHARED_ACCOUNT="1",
     )
     server.root = root
     yield server

@@ -9,7 +9,6 @@ import pytest
 from conftest import ON_A_FREE_PORT, TOKEN, ServerProcess
 
 from gym_server.cli import main
-from gym_server.cli.token_file import new_token
 
 pytestmark = pytest.mark.slow
 
@@ -71,34 +70,11 @@ def test_who_shows_no_token_gets_one_answer_a_connection(locked):
                 assert answer.headers["Connection"] == closes
 
 
-def test_no_auth_says_that_the_variable_is_not_meant_and_shutdown_can_be_switched_off(serve):
-    server = serve("--host", "0.0.0.0", "--no-auth", "--no-shutdown", GYM_SERVER_TOKEN=TOKEN)
+def test_no_auth_says_that_the_variable_is_not_meant(serve):
+    server = serve("--host", "0.0.0.0", "--no-auth", GYM_SERVER_TOKEN=TOKEN)
     assert ask(server, token=None)[0] == 200
-    status, answer = ask(server, "POST", "/v1/shutdown/", token=None)
-    assert (status, answer["code"]) == (403, "shutdown_disabled")
     assert names_a_path_too_many(server)
     assert server.stop()[0] == 0
-
-
-def test_a_token_of_its_own_is_told_to_who_started_the_server_and_serves_one_user(serve, tmp_path):
-    server = serve("--own-token", GYM_SERVER_TOKEN=TOKEN)
-    assert len(server.token) >= 32
-    assert ask(server, token=server.token)[0] == 200
-    assert ask(server, token=None)[0] == ask(server, token=TOKEN)[0] == 401
-    assert ask(server, "POST", "/v1/shutdown/", token=None)[0] == 401
-    # The machine belongs to one user, so monitors may write to any temporary folder.
-    made = ask(server, "POST", "/v1/envs/", {"env_id": "CartPole-v1"}, server.token)[1]
-    start = f"/v1/envs/{made['instance_id']}/monitor/start/"
-    monitor = {"directory": str(tmp_path / "monitor"), "force": False}
-    assert ask(server, "POST", start, monitor, server.token)[0] in (200, 204)
-    assert new_token() != server.token
-    _, output, errors = server.stop()
-    assert server.token not in output + errors
-
-
-def test_a_token_of_its_own_is_nothing_for_others(capsys):
-    assert main.main(["--port", "0", "--own-token", "--host", "0.0.0.0"]) == 1
-    assert "--token-file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -107,7 +83,6 @@ def test_a_token_of_its_own_is_nothing_for_others(capsys):
         ("short", [], "16 to 1,024"),
         ("", [], "16 to 1,024"),
         (TOKEN, ["--no-auth"], "exclude each other"),
-        (TOKEN, ["--own-token"], "exclude each other"),
         (None, [], "cannot be read"),
     ],
 )
@@ -156,10 +131,11 @@ def names_a_path_too_many(server):
     return "may be a path" in ask(server, "POST", "/v1/envs/", body)[1]["message"]
 
 
-def test_kwargs_name_files_on_a_server_of_ones_own_alone(serve, shared, locked):
+def test_kwargs_name_files_where_nobody_else_is_served(serve, shared, locked):
     assert not names_a_path_too_many(shared)
-    assert names_a_path_too_many(locked)
-    assert not names_a_path_too_many(serve("--allow-path", "/no", GYM_SERVER_TOKEN=TOKEN))
+    assert not names_a_path_too_many(locked)
+    of_a_front = serve(GYM_SERVER_TOKEN=TOKEN, GYM_SERVER_SHARED_ACCOUNT="1")
+    assert names_a_path_too_many(of_a_front)
 
 
 def test_http_1_0_needs_no_host(shared):

@@ -83,3 +83,14 @@ def test_a_long_message_is_cut_in_what_is_answered():
     body = answer_to(environment_error(RuntimeError(LONG)))[1]
     assert body["message"].startswith("The environment raised RuntimeError: xxx")
     assert len(body["message"]) == 2000 and body["message"].endswith("...")
+
+
+def test_a_warning_is_logged_once_a_minute(monkeypatch, caplog):
+    now = [0.0]
+    monkeypatch.setattr(logs.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(logs, "_warned", {})
+    for at in (0, 59, 61):
+        now[0] = at
+        logs._show_warning("after the end", UserWarning, "env.py", 1)
+    logs._show_warning("another", UserWarning, "env.py", 1)
+    assert [record.args[-1] for record in caplog.records] == ["after the end"] * 2 + ["another"]

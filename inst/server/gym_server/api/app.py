@@ -22,10 +22,9 @@ from gym_server.api.open_streams import OpenStreams
 from gym_server.api.routes import BLUEPRINTS, ROUTES
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
-from gym_server.envs.allowed_paths import AllowedPaths
 from gym_server.errors import GymServerError, body_too_large, busy_receiving, malformed_request
 from gym_server.manager.instance_manager import InstanceManager
-from gym_server.manager.limits import Limits, Watchers
+from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
@@ -41,26 +40,23 @@ class Config:
 
     Attributes:
         monitor_dir: where monitors write; None for a new temporary directory.
-        temporary_monitors: whether they may also write below the system's temporary directory.
         allowed_modules: the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
         limits: the limits for all clients together.
         stop: asks the server to stop after answering the requests in progress.
         access: which requests the server accepts.
-        client_stop: whether clients may stop it.
-        allowed_paths: directories with files that kwargs may name; None for any path.
+        is_private: whether its clients may name files as arguments of environments, and have
+            monitors write below the system's temporary directory.
         watch_prefix: what the keys of watch pages begin with.
     """
 
     monitor_dir: Path | None = None
-    temporary_monitors: bool = True
     allowed_modules: Collection[str] = ()
     max_body_bytes: int = 16 * 2**20
     limits: Limits = field(default_factory=Limits)
     stop: Callable[[], None] = lambda: None
     access: Access = field(default_factory=Access)
-    client_stop: bool = True
-    allowed_paths: Collection[Path] | None = None
+    is_private: bool = True
     watch_prefix: str = ""
 
 
@@ -78,14 +74,12 @@ class GymApp(Flask):
         """Create the services and the routes."""
         super().__init__("gym_server", static_folder=None)
         self._renderer = RenderThread()
-        self._monitor_root = MonitorRoot(
-            config.monitor_dir, config.temporary_monitors, config.limits.max_monitor_mb * 2**20
-        )
+        self._monitor_root = MonitorRoot(config.monitor_dir, config.is_private)
         self._instances = InstanceManager(
             config.allowed_modules,
             self._renderer,
             config.limits,
-            AllowedPaths(config.allowed_paths),
+            config.is_private,
         )
         watch_keys = WatchKeys(prefix=config.watch_prefix)
         self._guard = Guard(config.access, watch_keys)
@@ -97,8 +91,7 @@ class GymApp(Flask):
             self._instances,
             self._rollouts,
             self._monitor_root,
-            config.stop if config.client_stop else _refuse_to_stop,
-            Watchers(config.limits.max_watchers),
+            config.stop,
             OpenStreams(self._exactly_once, config.max_body_bytes),
             watch_keys if config.access.token is not None else None,
         )
@@ -188,10 +181,6 @@ def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Res
         page = match.route.refusal_page(match.path, refusal.status)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return failure(refusal)
-
-
-def _refuse_to_stop() -> None:
-    raise GymServerError("shutdown_disabled", "Clients cannot stop this server")
 
 
 def _for_flask(response: Response) -> flask.Response:

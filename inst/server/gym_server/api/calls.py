@@ -11,7 +11,6 @@ from gym_server.api.open_streams import OpenStreams
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
-from gym_server.manager.limits import Watchers
 from gym_server.manager.rollouts import Rollouts
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
@@ -29,7 +28,6 @@ class Services:
         rollouts: plays whole episodes.
         monitor_root: where monitors may write.
         stop: asks the server to stop after answering the requests in progress.
-        watchers: counts the watchers that wait for a frame.
         streams: steps and resets by WebSockets.
         watch_keys: the keys that open watch pages; None if pages need no key.
     """
@@ -38,7 +36,6 @@ class Services:
     rollouts: Rollouts
     monitor_root: MonitorRoot
     stop: Callable[[], None]
-    watchers: Watchers
     streams: OpenStreams
     watch_keys: WatchKeys | None = None
 

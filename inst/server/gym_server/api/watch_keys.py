@@ -6,7 +6,6 @@ import hashlib
 import secrets
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable
 
 # How long a key is valid after it was made or last used.
@@ -43,14 +42,8 @@ class WatchKeys:
             self._drop_old()
             self._keys[_digest(key)] = (instance_id, self._clock() + KEY_SECONDS)
             if len(self._keys) > _MOST_KEYS:
-                self._drop_one()
+                del self._keys[next(iter(self._keys))]
         return key
-
-    def _drop_one(self) -> None:
-        """Drop a key of the environment with the most, so that nobody pushes out other keys."""
-        owners = Counter(owner for owner, _ in self._keys.values())
-        ((owner, _),) = owners.most_common(1)
-        del self._keys[next(key for key, value in self._keys.items() if value[0] == owner)]
 
     def opens(self, key: str, instance_id: str) -> bool:
         """Return whether a key is valid for an instance's page, and renew it."""

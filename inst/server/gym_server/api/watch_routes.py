@@ -103,8 +103,7 @@ def env_watch_state(call: Call) -> Response:
     """Wait for a new frame; frames are drawn only while somebody waits."""
     sub_env = call.fields["sub_env"] or 0
     call.instance.check_sub_env(sub_env)
-    with call.services.watchers.one_more():
-        body = call.instance.viewer.next_frame(sub_env, call.fields["after"])
+    body = call.instance.viewer.next_frame(sub_env, call.fields["after"])
     return Response(200, body, JSON, headers=(_NO_STORE,))
 
 

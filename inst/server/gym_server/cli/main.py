@@ -21,10 +21,9 @@ from gym_server.api.watch_keys import PREFIX_VARIABLE
 from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
-from gym_server.cli.own_log import keep_short
 from gym_server.cli.port_holder import port_holder
 from gym_server.cli.stuck import end_when_stuck
-from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token, new_token
+from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
 from gym_server.cli.users import BadUsersError, make_front
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
@@ -34,6 +33,9 @@ log = logging.getLogger("gym_server")
 
 # The second is Windows' error for a port that another process has bound exclusively.
 _TAKEN = (errno.EADDRINUSE, 10013)
+
+# The environment variable by which the front (--users) says that all servers run under one account.
+SHARED_VARIABLE = "GYM_SERVER_SHARED_ACCOUNT"
 
 # How many of the largest bodies may arrive at a time. Of smaller bodies there may be more, and
 # small ones do not count.
@@ -65,9 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(fault))
     except OSError as error:
         return _fail(f"the file {options.token_file} cannot be read: {error.strerror or error}")
-    of_one_user = token is None or options.own_token
-    is_private = is_loopback(options.host) and of_one_user
-    if not is_loopback(options.host) and of_one_user and not options.no_auth:
+    is_open = token is None and not is_loopback(options.host)
+    if is_open and not options.no_auth:
         return _fail(
             f"--host {options.host} lets anybody on the network run environments on this machine "
             f"and write files; use --token-file FILE or the variable {VARIABLE}, or --no-auth to "
@@ -75,7 +76,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     allow_many_open_files()
     stop = _Stop()
-    max_body_bytes = options.max_body_mb * 2**20
     try:
         monitor_dir = _prepare_monitor_dir(options.monitor_dir)
         listener = bind(options.host, options.port)
@@ -84,22 +84,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     app = create_app(
         Config(
             monitor_dir=monitor_dir,
-            temporary_monitors=is_private,
             allowed_modules=options.allow_module,
-            max_body_bytes=max_body_bytes,
-            limits=Limits(**{one.name: getattr(options, one.name) for one in fields(Limits)}),
+            limits=Limits(
+                **{
+                    one.name: getattr(options, one.name)
+                    for one in fields(Limits)
+                    if hasattr(options, one.name)
+                }
+            ),
             stop=stop,
             access=Access(token, options.host, options.allow_host),
-            client_stop=not options.no_shutdown,
-            allowed_paths=None if is_private else options.allow_path,
+            is_private=not is_open and os.environ.pop(SHARED_VARIABLE, None) is None,
             watch_prefix=os.environ.pop(PREFIX_VARIABLE, ""),
         )
     )
-    server = Server(app, listener, max_body_bytes, Budget(_LARGEST_BODIES * max_body_bytes))
+    budget = Budget(_LARGEST_BODIES * Config.max_body_bytes)
+    server = Server(app, listener, Config.max_body_bytes, budget)
     stop.server = server
     app.answer_for = server.answer_for
-    if options.own_token:
-        print(f"Token: {token}", flush=True)
     _begin(options, server.port, stop)
     _serve(app, server)
     return 0
@@ -126,9 +128,7 @@ def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> 
     """Do what remains before serving: signals, the log, and the line with the address."""
     _stop_on_signals(stop)
     if options.stop_on_stdin_eof:
-        threading.Thread(target=_wait_for_eof, args=(stop, options.own_log), daemon=True).start()
-    if options.own_log is not None:
-        threading.Thread(target=keep_short, args=(options.own_log,), daemon=True).start()
+        threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
     end_when_stuck(options.max_call_seconds)
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{port}", flush=True)
@@ -138,11 +138,9 @@ def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> 
 
 
 def _find_token(options: argparse.Namespace) -> str | None:
-    if options.no_auth + options.own_token + (options.token_file is not None) > 1:
-        raise BadTokenError("--no-auth, --own-token and --token-file exclude each other")
+    if options.no_auth and options.token_file is not None:
+        raise BadTokenError("--no-auth and --token-file exclude each other")
     token = find_token(options.token_file, os.environ)
-    if options.own_token:
-        return new_token()
     return None if options.no_auth else token
 
 
@@ -189,16 +187,11 @@ def _stop_on_signals(stop: Callable[[], None]) -> None:
             signal.signal(getattr(signal, name), lambda *_: stop())
 
 
-def _wait_for_eof(stop: Callable[[], None], own_log: Path | None) -> None:
+def _wait_for_eof(stop: Callable[[], None]) -> None:
     # Do not use sys.stdin: this thread would hold its lock when the interpreter ends.
-    heard_a_line = False
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
-            heard_a_line = True
-    if own_log is not None and not heard_a_line:
-        # Nobody is left to read or remove the log. Windows cannot delete open files.
-        with contextlib.suppress(OSError):
-            own_log.unlink()
+            pass
     stop()
 
 

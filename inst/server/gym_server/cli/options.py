@@ -39,14 +39,6 @@ def parser() -> argparse.ArgumentParser:
         "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
     )
     options.add_argument(
-        "--own-log",
-        type=Path,
-        metavar="FILE",
-        help="the file that standard error is redirected to; beyond 8 MiB it is cut to its last "
-        "MiB. With --stop-on-stdin-eof, it is removed if standard input closes without a line, "
-        "which means that the program that started the server was killed",
-    )
-    options.add_argument(
         "--monitor-dir", type=Path, help="where monitors write (a new temporary directory)"
     )
     options.add_argument(
@@ -64,13 +56,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _add_limits(options: argparse.ArgumentParser) -> None:
-    limits = options.add_argument_group("limits, for all clients together")
-    limits.add_argument(
-        "--max-body-mb",
-        type=_number(1, 1024),
-        default=16,
-        help="size of the largest request (%(default)s)",
-    )
+    limits = options.add_argument_group("limits")
 
     def add(name: str, kind: Callable[[str], float], text: str, metavar: str | None = None) -> None:
         """Add the option for a field of ``Limits``."""
@@ -78,12 +64,6 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         default = getattr(Limits, name)
         limits.add_argument(option, type=kind, default=default, help=text, metavar=metavar)
 
-    add("max_instances", _number(1, 1_000_000), "environments at a time (%(default)s)")
-    add(
-        "max_num_envs",
-        _number(1, 1_000_000),
-        "sub-environments of the largest vector environment (%(default)s)",
-    )
     add(
         "max_total_sub_envs",
         _number(1, 100_000_000),
@@ -105,12 +85,6 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         "memory of all environments, estimated before they are created and measured afterwards "
         "(%(default)s)",
     )
-    add(
-        "max_monitor_mb",
-        _number(1, 2**30),
-        "what all monitors may write to the disk until the server ends (%(default)s)",
-    )
-    add("max_watchers", _number(1, 1_000_000), "watch pages at a time (%(default)s)")
     add(
         "max_call_seconds",
         _duration,
@@ -135,9 +109,20 @@ def _duration(text: str) -> float:
 
 # Options of earlier versions, and what to do instead.
 _ENDED = {
+    "--allow-path": "the user of a server with a token may name any file",
     "--isolate": "the server serves one user, and environments play in its own process; for a "
     "class, --users FILE starts a server for each user",
+    "--max-body-mb": "a request may have 16 MiB",
+    "--max-instances": "a server may have 1,000 environments; --max-memory-mb limits its memory",
+    "--max-monitor-mb": "the server's user looks after the disk; a service can have a quota",
+    "--max-num-envs": "an environment may have 100,000 sub-environments; --max-memory-mb limits "
+    "the server's memory",
+    "--max-watchers": "every watch page is one of the server's user",
     "--max-worker-mb": "--max-memory-mb limits the server",
+    "--no-shutdown": "the server serves one user, who may stop it; for a class, --users FILE "
+    "starts it anew at the next request",
+    "--own-log": "redirect standard error to the file",
+    "--own-token": f"the variable {VARIABLE}, or --token-file FILE, has the token",
 }
 
 
@@ -152,7 +137,13 @@ class _RefuseEnded(argparse.Action):
 
 def _add_ended(options: argparse.ArgumentParser) -> None:
     for option in _ENDED:
-        options.add_argument(option, nargs="?", action=_RefuseEnded, help=argparse.SUPPRESS)
+        options.add_argument(
+            option,
+            nargs="?",
+            action=_RefuseEnded,
+            default=argparse.SUPPRESS,
+            help=argparse.SUPPRESS,
+        )
 
 
 def _host_name(text: str) -> str:
@@ -191,12 +182,6 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         "--idle-minutes; read again when it changes",
     )
     options.add_argument(
-        "--own-token",
-        action="store_true",
-        help="generate a token, and print it before the address: for a single user, who may do "
-        "anything that this server can do",
-    )
-    options.add_argument(
         "--no-auth",
         action="store_true",
         help="serve everybody without a token, even on a --host that others can reach",
@@ -208,18 +193,6 @@ def _add_access(options: argparse.ArgumentParser) -> None:
         type=_host_name,
         metavar="NAME",
         help="another name (or NAME:PORT) of the server, such as a proxy's; may be repeated",
-    )
-    options.add_argument(
-        "--no-shutdown", action="store_true", help="do not let clients stop the server"
-    )
-    options.add_argument(
-        "--allow-path",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="DIR",
-        help="a directory with files that kwargs may name, on a server with a token or a --host "
-        "that others can reach; may be repeated",
     )
 
 

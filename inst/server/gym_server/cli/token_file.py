@@ -1,10 +1,9 @@
-"""The token that requests must have: generated or given, but never on the command line."""
+"""The token that requests must have; it is never on the command line."""
 
 from __future__ import annotations
 
 import logging
 import os
-import secrets
 import stat
 from collections.abc import MutableMapping
 from pathlib import Path
@@ -37,11 +36,6 @@ def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | No
         _warn_of_readers(file)
         return _checked(file.read_bytes().decode("ascii", "replace"), f"the file {file}")
     return _checked(of_variable, f"the variable {VARIABLE}") if of_variable else None
-
-
-def new_token() -> str:
-    """Return a token that cannot be guessed."""
-    return secrets.token_urlsafe(32)
 
 
 def _checked(text: str, place: str) -> str:

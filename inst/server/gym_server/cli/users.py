@@ -19,8 +19,8 @@ from gym_server.front.users_file import UsersFile, UsersFileError
 # The options that are about the front, or that it decides for its servers.
 _OF_THE_FRONT = frozenset(
     {
-        *("users", "host", "port", "allow_host", "token_file", "own_token", "no_auth"),
-        *("stop_on_stdin_eof", "own_log", "monitor_dir", "max_memory_mb", "max_processes"),
+        *("users", "host", "port", "allow_host", "token_file", "no_auth"),
+        *("stop_on_stdin_eof", "monitor_dir", "max_memory_mb", "max_processes"),
     }
 )
 
@@ -37,21 +37,20 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
     """
     if os.name != "posix":
         raise BadUsersError("--users needs Linux or macOS; on Windows, start a server a user")
-    if options.no_auth or options.own_token or options.token_file is not None:
+    if options.no_auth or options.token_file is not None:
         raise BadUsersError(
-            "--users has the token of each user, so it excludes --no-auth, --own-token and "
-            "--token-file"
+            "--users has the token of each user, so it excludes --no-auth and --token-file"
         )
     # A token in the variable is not meant for this server.
     os.environ.pop(VARIABLE, None)
     try:
         users = UsersFile(options.users)
         folders = Folders(options.monitor_dir)
-        if (options.allow_module or options.allow_path) and not folders.separate:
+        if options.allow_module and not folders.separate:
             raise BadUsersError(
-                "--allow-module and --allow-path would let users act on each other's servers, "
-                "which run under one account here; start it as root, with a Python that all "
-                "accounts can run, or leave them out"
+                "--allow-module would let users act on each other's servers, which run under one "
+                "account here; start it as root, with a Python that all accounts can run, or leave "
+                "it out"
             )
         starts = Starts(folders, _wishes(options), len(users.users))
     except (UsersFileError, ShareError) as error:

@@ -1,10 +1,9 @@
-"""The paths that clients may pass to environments and wrappers."""
+"""What the texts in arguments of environments and wrappers may be."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError
@@ -18,47 +17,29 @@ _PATH_LIKE = re.compile(r"[/\\\0]|^[~.]|^[A-Za-z]:")
 _DEEPEST = 32
 
 
-class AllowedPaths:
-    """The files of this machine that clients may name."""
+def check(config: EnvConfig, may_name_files: bool) -> None:
+    """Check all arguments of an environment and its wrappers.
 
-    def __init__(self, directories: Collection[Path] | None = None) -> None:
-        """Set the allowed directories.
+    Args:
+        config: what the client chose.
+        may_name_files: whether an argument may be the path of a file, such as MuJoCo's
+            ``xml_file``.
 
-        Args:
-            directories: paths must be below one of them; None allows any path, for a server whose
-                only client is the user who started it.
-        """
-        self._directories = None if directories is None else [d.resolve() for d in directories]
-
-    def check(self, config: EnvConfig) -> None:
-        """Refuse paths that are not allowed, in all arguments of the environment and its wrappers.
-
-        Raises:
-            GymServerError: ``invalid_kwargs``.
-        """
-        self._check(config.kwargs or {}, "'kwargs'")
-        for wrapper in config.wrappers:
-            self._check(wrapper.kwargs, wrapper.name)
-
-    def _check(self, kwargs: dict, owner: str) -> None:
+    Raises:
+        GymServerError: ``invalid_kwargs``.
+    """
+    arguments = [("'kwargs'", config.kwargs or {})]
+    arguments += [(wrapper.name, wrapper.kwargs) for wrapper in config.wrappers]
+    for owner, kwargs in arguments:
         for text in _texts(kwargs, owner):
-            if self._directories is None or _PATH_LIKE.search(text) is None:
-                continue
-            if not self._lies_below(text, self._directories):
+            if not may_name_files and _PATH_LIKE.search(text):
                 raise GymServerError(
                     "invalid_kwargs",
-                    f"{owner}: {brief(text)} may be a path, and it is not below a directory that "
-                    "the server's operator allowed",
-                    "start the server with --allow-path DIR, and send the absolute path",
+                    f"{owner}: {brief(text)} may be a path, and this server reads no files for its "
+                    "clients",
+                    "use a server of your own, such as the one that gym_make() starts; with "
+                    "--users, one that root started",
                 )
-
-    def _lies_below(self, text: str, directories: list[Path]) -> bool:
-        try:
-            path = Path(text)
-            # The meaning of a relative path depends on the process that opens it.
-            return path.is_absolute() and any(d in path.resolve().parents for d in directories)
-        except (OSError, RuntimeError, ValueError):
-            return False
 
 
 def _texts(value: object, owner: str, depth: int = 0) -> Iterator[str]:

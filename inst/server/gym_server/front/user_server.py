@@ -88,7 +88,10 @@ class UserServer:
             "GYM_SERVER_WATCH_PREFIX": f"{self.route}.",
         }
         account: dict[str, Any] = {}
-        if start.uid is not None:
+        if start.uid is None:
+            # The files of one user are those of all.
+            variables["GYM_SERVER_SHARED_ACCOUNT"] = "1"
+        else:
             variables["HOME"] = str(start.folder)
             account = {"user": start.uid, "group": start.uid, "extra_groups": []}
         # It ends when its standard input closes, so also when the front is killed.

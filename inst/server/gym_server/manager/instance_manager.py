@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gym_server.budget import Budget
-from gym_server.envs import registry, wrappers
-from gym_server.envs.allowed_paths import AllowedPaths
+from gym_server.envs import allowed_paths, registry, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import (
@@ -80,7 +79,7 @@ class InstanceManager:
         allowed_modules: Collection[str],
         renderer: RenderThread,
         limits: Limits | None = None,
-        allowed_paths: AllowedPaths | None = None,
+        may_name_files: bool = True,
     ) -> None:
         """Start with no instances.
 
@@ -88,10 +87,10 @@ class InstanceManager:
             allowed_modules: the modules that an env_id may import.
             renderer: the process's render thread.
             limits: how many instances there may be, and how large.
-            allowed_paths: the files that clients may name; None for any.
+            may_name_files: whether arguments of environments may be paths of files.
         """
         self._limits = limits or Limits()
-        self._allowed_paths = allowed_paths or AllowedPaths()
+        self._may_name_files = may_name_files
         self._allowed_modules = frozenset(allowed_modules)
         self._renderer = renderer
         self._lock = threading.Lock()
@@ -120,7 +119,7 @@ class InstanceManager:
                 ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
         """
         # Check these first, before creating anything.
-        self._allowed_paths.check(config)
+        allowed_paths.check(config, self._may_name_files)
         wrappers.check(config.wrappers)
         if config.num_envs is None:
             make_vec.check_single(config)
@@ -207,7 +206,7 @@ class InstanceManager:
         Raises:
             GymServerError: the client may not use this environment, wrapper or path.
         """
-        self._allowed_paths.check(config)
+        allowed_paths.check(config, self._may_name_files)
         wrappers.check(config.wrappers)
         return Task(config, self._allowed_modules, self._budget.limit, **what)
 

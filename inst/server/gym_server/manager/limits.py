@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gym_server.errors import GymServerError
@@ -46,9 +43,6 @@ class Limits:
         max_memory_mb: the memory of all environments in MiB, estimated in advance
             (``memory_estimate``) and measured afterwards (``Account``). The default is half the
             memory of a small machine.
-        max_monitor_mb: how much all monitors may write to the disk until the server ends, in MiB.
-            The default fits some hundred thousand short videos.
-        max_watchers: how many pages may wait for frames at a time.
         max_call_seconds: how long a call may take before its instance is evicted; 0 for no limit.
             The default is longer than ordinary calls, and short enough that the error is there
             after a coffee break.
@@ -57,13 +51,11 @@ class Limits:
     """
 
     max_instances: int = 1000
-    max_num_envs: int = 16384
+    max_num_envs: int = 100_000
     max_total_sub_envs: int | None = None
     max_processes: int = 128
     max_rollout_processes: int | None = None
     max_memory_mb: int = 4096
-    max_monitor_mb: float = 4096
-    max_watchers: int = 100
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0
 
@@ -88,8 +80,7 @@ class Limits:
             raise GymServerError(
                 "too_many_instances",
                 f"This server has {self.max_instances} environments, the most it allows",
-                "close some, GET /v1/instances/ lists them; the server's option --max-instances "
-                "sets the limit",
+                "close some, GET /v1/instances/ lists them",
             )
         most = self.max_total_sub_envs or 4 * self.max_num_envs
         # An environment larger than max_num_envs gets its own error when it is created.
@@ -110,30 +101,3 @@ class Limits:
                 "close some, GET /v1/instances/ lists them, or use fewer processes for sub-"
                 "environments (num_workers); the server's option --max-processes sets the limit",
             )
-
-
-class Watchers:
-    """Counts the watchers that wait for a frame, of all environments."""
-
-    def __init__(self, most: int) -> None:
-        """Set how many may wait at a time."""
-        self._most = most
-        self._free = threading.Semaphore(most)
-
-    @contextlib.contextmanager
-    def one_more(self) -> Iterator[None]:
-        """Count one more watcher for a while.
-
-        Raises:
-            GymServerError: ``too_many_watchers``.
-        """
-        if not self._free.acquire(blocking=False):
-            raise GymServerError(
-                "too_many_watchers",
-                f"This server shows environments to {self._most} watchers, the most it allows",
-                "close a page; the server's option --max-watchers sets the limit",
-            )
-        try:
-            yield
-        finally:
-            self._free.release()

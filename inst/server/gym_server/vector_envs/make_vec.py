@@ -149,7 +149,7 @@ def _check(config: EnvConfig, num_envs: int, max_num_envs: int) -> None:
         raise GymServerError(
             "too_many_sub_envs",
             f"This server allows at most {max_num_envs} sub-environments, not {num_envs}",
-            "the server's option --max-num-envs sets the limit",
+            "create several environments",
         )
     if config.num_workers is not None:
         _check_num_workers(config, config.num_workers, num_envs)

@@ -313,17 +313,3 @@ def test_where_no_token_is_asked_for_there_are_no_keys(client, create):
     url = create()
     assert client.post(f"{url}/watch/key/").json == {"key": None, "seconds": None}
     assert client.get(f"{url}/watch/").status_code == 200
-
-
-# Stopping ------------------------------------------------------------------------------------
-
-
-def test_clients_stop_it_only_where_they_may():
-    stopped = []
-    for may in (True, False):
-        app = create_app(Config(stop=lambda: stopped.append(1), client_stop=may))
-        answer = app.test_client().post("/v1/shutdown/")
-        app.close()
-        assert answer.status_code == (200 if may else 403)
-    assert answer.json["code"] == "shutdown_disabled"
-    assert stopped == [1]

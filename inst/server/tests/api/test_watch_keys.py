@@ -49,14 +49,6 @@ def test_keys_take_no_room_without_end():
     assert len(keys._keys) == 1
 
 
-def test_who_makes_too_many_keys_loses_their_own():
-    keys = WatchKeys()
-    others = {name: keys.make(name) for name in ("a", "b")}
-    made = [keys.make(f"mine{number % 10}") for number in range(10_100)]
-    assert all(keys.opens(key, name) for name, key in others.items())
-    assert not keys.opens(made[0], "mine0") and keys.opens(made[-1], "mine9")
-
-
 def test_keys_are_not_kept_in_clear():
     keys = WatchKeys()
     assert keys.make("a") not in repr(vars(keys))

@@ -14,7 +14,7 @@ def test_its_entry_point_is_understood():
     command = json.loads(re.search(r"^ENTRYPOINT (\[.*\])$", text, re.MULTILINE)[1])
     assert command[:3] == ["python", "-m", "gym_server"]
     options = parser().parse_args(command[3:])
-    assert options.token_file and options.no_shutdown
+    assert options.token_file
 
 
 def test_what_it_copies_is_there():

@@ -7,7 +7,14 @@ from gym_server.manager.limits import Limits
 def test_without_options_the_limits_are_those_of_a_lab():
     options = parser().parse_args([])
     for name, value in vars(Limits()).items():
-        assert getattr(options, name) == value
+        assert getattr(options, name, value) == value
+
+
+def test_an_option_that_ended_says_what_replaces_it(capsys):
+    for words in (["--no-shutdown"], ["--max-watchers", "5"], ["--own-log=x"]):
+        with pytest.raises(SystemExit):
+            parser().parse_args(words)
+        assert f"{words[0].split('=')[0]} is gone: " in capsys.readouterr().err
 
 
 def test_limits_of_time_may_be_parts_and_0():
@@ -26,13 +33,9 @@ def test_limits_of_time_are_numbers(name, value, capsys):
 @pytest.mark.parametrize(
     "name",
     [
-        "--max-instances",
         "--max-total-sub-envs",
-        "--max-watchers",
-        "--max-num-envs",
         "--max-processes",
         "--max-memory-mb",
-        "--max-monitor-mb",
     ],
 )
 def test_limits_of_numbers_are_at_least_1(name):

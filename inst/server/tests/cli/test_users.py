@@ -32,10 +32,8 @@ def refused(tmp_path, capsys, monkeypatch):
     ("options", "words"),
     [
         (["--no-auth"], "excludes --no-auth"),
-        (["--own-token"], "--own-token"),
         (["--token-file", "x"], "--token-file"),
         (["--allow-module", "os"], "under one account"),
-        (["--allow-path", "/"], "under one account"),
         (["--max-memory-mb", "100"], "use a larger --max-memory-mb"),
         (["--monitor-dir", __file__], "cannot be used"),
     ],

@@ -90,7 +90,6 @@ def test_an_enormous_body_is_413_in_json_for_a_client_that_sends_all_of_it(serve
         )
     assert (status, headers["content-type"]) == (413, "application/json")
     assert json.loads(body)["code"] == "body_too_large"
-    assert "--max-body-mb" in json.loads(body)["hint"]
 
 
 def test_an_enormous_chunked_body_is_413_in_json(server):

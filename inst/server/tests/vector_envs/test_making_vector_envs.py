@@ -179,12 +179,11 @@ def test_a_server_has_a_largest_number_of_sub_envs(small_server):
     answer = small_server.post("/v1/envs/", json={"env_id": "CartPole-v1", "num_envs": 101})
     assert (answer.status_code, answer.json["code"]) == (429, "too_many_sub_envs")
     assert answer.json["message"] == "This server allows at most 100 sub-environments, not 101"
-    assert "--max-num-envs" in answer.json["hint"]
 
 
 def test_there_is_a_largest_number_by_default(client):
-    refusal = refused(client, 429, num_envs=16385)
-    assert refusal["message"] == "This server allows at most 16384 sub-environments, not 16385"
+    refusal = refused(client, 429, num_envs=100_001)
+    assert refusal["message"] == "This server allows at most 100000 sub-environments, not 100001"
 
 
 @pytest.mark.parametrize("mode", ["sync", "async"])
