@@ -18,7 +18,7 @@
 #' @param num_envs The number of sub-environments of a vector environment, a whole number of at
 #'   least 1. Sub-environments are copies of the environment that are reset and stepped together.
 #'   Each has its own row in observations and actions, even if there is only one. The server's limit
-#'   is 16,384 unless set otherwise. `NULL`, the default, makes a single environment.
+#'   is 100,000. `NULL`, the default, makes a single environment.
 #' @param kwargs A named list of further arguments for the environment, such as `list(gravity = -5)`
 #'   for LunarLander or `list(map_name = "8x8")` for FrozenLake. `list(max_episode_steps = 1000)`
 #'   sets another step limit for any environment; -1 removes it. A vector of length one is sent as a
