@@ -106,6 +106,9 @@ format.gym_agent_random <- function(x, ...) {
 #' @param resume Resume from the `checkpoint`? `TRUE`, the default, resumes if the file exists, with
 #'   a message of class `gym_message_resumed`, and starts otherwise. A finished search is returned
 #'   at once. `FALSE` starts again and replaces the file.
+#' @param seeds `NULL`, the default, or different whole numbers to search once with each. One search
+#'   says little about how long searches take. All are returned, an object of class [gym_trainings],
+#'   and `plot()` shows how many rounds they needed. Each is the same as `search_random(seed = )`.
 #' @return An object of class [gym_search], with methods for [print()],
 #'   [summary()][summary.gym_search()], [plot()][plot.gym_search()],
 #'   [as.data.frame()][as.data.frame.gym_search()] and [predict()]. It is also a `gym_training`, see
@@ -140,17 +143,21 @@ format.gym_agent_random <- function(x, ...) {
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @references The method: the tutorial *Artificial Intelligence in R (I)* (2018). The target of
 #'   CartPole-v0: Gym's `reward_threshold`.
-#' @seealso [gym_search] for using the result; [search_repeat()] for how long such searches take.
+#' @seealso [gym_search] for using the result.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)
 #' search
 #' plot(search)
 #' search$policy
+#'
+#' searches <- search_random("CartPole-v0", seeds = 1:10)
+#' searches
+#' plot(searches)
 search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds = 50,
                           episodes = 5, target = NULL, max_steps = NULL, seed = NULL,
                           progress = rlang::is_interactive(), client = gym_client(),
-                          checkpoint = NULL, resume = TRUE) {
+                          checkpoint = NULL, resume = TRUE, seeds = NULL) {
   check_count(rounds)
   unchosen <- if (missing(env)) "gym_warning_gymnasium" else character()
   # A new network draws weights; that must not change the search.
@@ -159,7 +166,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   suppressWarnings(classes = unchosen, naming_own_call(
     train_agent(
       agent_random(), env, policy, iterations = as.integer(rounds), episodes = episodes,
-      target = target, max_steps = max_steps, seed = seed, solved_by = "candidate",
+      target = target, max_steps = max_steps, seed = seed, seeds = seeds, solved_by = "candidate",
       checkpoint = checkpoint, resume = resume, progress = progress, client = client
     ),
     "train_agent"

@@ -7,7 +7,7 @@
 #' Set a plan of the package future, such as `future::plan(future::multisession, workers = 8)` or
 #' `future::plan(future::cluster, workers = c("host1", "host2"))`. Its workers then play the
 #' episodes of [rollout()], [evaluate_policy()], [search_random()] and the other searches,
-#' [train_agent()], [search_landscape()] and [gym_objective()]. `train_agent(seeds = )` gives each
+#' [train_agent()] and [gym_objective()]. `train_agent(seeds = )` gives each
 #' worker whole trainings. You need not change any call, and nothing changes without a plan.
 #'
 #' Results do not depend on the plan, to the last bit. A worker gets a list of episodes, or a batch

@@ -3,20 +3,15 @@
 #' Show every episode of a search as a point, the mean of each round as a line, and the target as a
 #' dashed line. Points of a round with almost the same return are side by side.
 #'
-#' Another `type` shows the network that was found, or the landscape of the networks around it. A
-#' landscape plays these networks, which takes some seconds each time. Use [search_landscape()] to
-#' play them once.
-#'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
 #'
 #' @inheritParams plot.gym_rollout
 #' @param x,object A search, as returned by [search_random()].
-#' @param type What to show: `"returns"`, the default; `"network"`, the best policy, by
-#'   [plot.gym_policy_network()]; or `"landscape"`, which calls [search_landscape()].
+#' @param type What to show: `"returns"`, the default; or `"network"`, the best policy, by
+#'   [plot.gym_policy_network()].
 #' @param main The title. `NULL`, the default, describes the search.
-#' @param ... Arguments of the network's picture, or of [search_landscape()], such as `size` and
-#'   `seed`. `plot()` passes its arguments to `autoplot()`.
+#' @param ... Arguments of the network's picture. `plot()` passes its arguments to `autoplot()`.
 #' @return A ggplot. `plot()` returns it invisibly.
 #' @section Errors: `gym_error_argument` if no round was played to its end.
 #' @rdname plot.gym_search
@@ -25,14 +20,11 @@
 #' search <- search_random("CartPole-v0", seed = 1)
 #' plot(search)
 #' plot(search, type = "network")
-autoplot.gym_search <- function(object, type = c("returns", "network", "landscape"), ...) {
-  type <- check_choice(type[1L], c("returns", "network", "landscape"), arg = "type")
+autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
+  type <- check_choice(type[1L], c("returns", "network"), arg = "type")
   if (type == "network") {
     check_found(object)
     return(autoplot.gym_policy_network(object$policy, ...))
-  }
-  if (type == "landscape") {
-    return(autoplot.gym_landscape(search_landscape(object, ...)))
   }
   check_dots_empty(...)
   check_has_rounds(object)

@@ -7,6 +7,9 @@
 #' middle half. For a single training, the line connects its evaluations. The dashed line is the
 #' target. Several trainings are compared in one picture, which has a panel for each environment.
 #'
+#' `type = "iterations"` shows how many iterations the seeds needed until they had reached the
+#' target, as bars. Seeds that have not reached it are counted in the text.
+#'
 #' Between two evaluations the return is interpolated linearly. The line of several seeds is thick
 #' while all of them train. It becomes thin when the first one ends; a seed that has ended counts
 #' with its last evaluation. The line of a single training is thin after its end, too. The picture
@@ -19,12 +22,15 @@
 #' @inheritParams plot.gym_rollout
 #' @param x,object Trainings, as returned by `train_agent(seeds = )`. You may give them another
 #'   name, which is then the name of their line, as in `plot(ARS = first, CEM = second)`.
+#' @param type What to show, a string: `"returns"` or `"iterations"`. The default is `"returns"`; of
+#'   searches by [search_random()], which have no evaluations, it is `"iterations"`.
 #' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, optionally
 #'   with names for their lines.
 #' @param main The title. `NULL`, the default, names the environment, the agent and the number of
 #'   seeds.
 #' @return A ggplot. `plot()` returns it invisibly.
-#' @section Errors: `gym_error_argument` if a training was never evaluated.
+#' @section Errors: `gym_error_argument` if a training was never evaluated, or for `"iterations"` if
+#'   no seed has reached the target.
 #' @rdname plot.gym_trainings
 #' @exportS3Method ggplot2::autoplot
 #' @examplesIf gym:::can_start_server()
@@ -33,8 +39,50 @@
 #' hill <- train_agent(agent_hill_climb(candidates = 16), "CartPole-v1", iterations = 10,
 #'                     eval_every = 2, seeds = 1:4)
 #' plot(ARS = ars, `hill climbing` = hill)
-autoplot.gym_trainings <- function(object, ...) {
-  trainings_picture(given_trainings(arguments_as_written(quote(object))))
+autoplot.gym_trainings <- function(object, ..., type = c("returns", "iterations")) {
+  trainings <- given_trainings(arguments_as_written(quote(object)))
+  if (missing(type) && are_searches(trainings)) type <- "iterations"
+  type <- check_choice(type[1L], c("returns", "iterations"), arg = "type")
+  if (type == "returns") trainings_picture(trainings) else iterations_picture(trainings)
+}
+
+are_searches <- function(trainings) {
+  all(vapply(unlist(lapply(trainings, each_training), FALSE), inherits, NA, "gym_search"))
+}
+
+# A panel for each training.
+iterations_picture <- function(trainings, call = rlang::caller_env()) {
+  each <- lapply(trainings, function(x) Filter(function(one) !one$interrupted, each_training(x)))
+  needed <- lapply(each, function(seeds) {
+    reached <- Filter(function(one) isTRUE(one$solved), seeds)
+    vapply(reached, function(one) nrow(one$history), 0L)
+  })
+  if (!length(unlist(needed))) {
+    gym_abort("There is nothing to plot: no seed has reached the target.",
+              class = "gym_error_argument", argument = "x", value = trainings[[1L]], call = call)
+  }
+  counts <- paste(lengths(needed), "of", lengths(each))
+  several <- length(each) > 1L
+  panels <- if (several) paste0(names(each), ": ", counts) else counts
+  bars <- data.frame(
+    iterations = unlist(needed, use.names = FALSE),
+    panel = factor(rep(panels, lengths(needed)), panels)
+  )
+  ggplot2::ggplot(bars, ggplot2::aes(.data$iterations)) +
+    ggplot2::geom_histogram(
+      binwidth = bin_width(bars$iterations), boundary = 0.5, fill = gym_colours[["blue"]],
+      colour = "white", linewidth = 0.2
+    ) +
+    (if (several) ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1L, drop = FALSE)) +
+    number_axis(ggplot2::scale_x_continuous) +
+    ggplot2::scale_y_continuous(breaks = function(limits) unique(round(pretty(limits)))) +
+    picture_labels(
+      trainings_title(trainings),
+      if (!several) paste(counts, "seeds have reached the target"),
+      x = paste(if (are_searches(trainings)) "rounds" else "iterations", "to the target"),
+      y = "seeds"
+    ) +
+    theme_gym()
 }
 
 trainings_picture <- function(trainings, call = rlang::caller_env()) {

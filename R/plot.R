@@ -49,10 +49,6 @@ plot.gym_evaluation <- show_picture
 #' @export
 plot.gym_frame <- show_picture
 
-#' @rdname plot.gym_landscape
-#' @export
-plot.gym_landscape <- show_picture
-
 #' @rdname plot.gym_policy_network
 #' @export
 plot.gym_policy <- show_picture
@@ -64,10 +60,6 @@ plot.gym_rollout <- show_picture
 #' @rdname plot.gym_search
 #' @export
 plot.gym_search <- show_picture
-
-#' @rdname plot.gym_searches
-#' @export
-plot.gym_searches <- show_picture
 
 #' @rdname plot.gym_solution
 #' @export

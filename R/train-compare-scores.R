@@ -66,7 +66,7 @@ run_scores <- function(trainings, curves, steps, call) {
     steps = at, by_end = by_end,
     notes = c(
       if (!by_end) paste("scores are those of the learning curves after", number_text(at), "steps"),
-      if (length(cut_short)) paste(count_of(length(cut_short), "interrupted run"), "left out")
+      if (length(cut_short)) interrupted_note(length(cut_short))
     )
   )
 }

@@ -1,6 +1,6 @@
 # Compares trainings that stop at a target by the steps that they needed.
 
-compare_by_steps <- function(trainings, level) {
+compare_by_steps <- function(trainings, level, call) {
   runs <- do.call(rbind, unname(Map(function(x, label) {
     ones <- each_training(x)
     of_each <- function(f, type) vapply(ones, f, type)
@@ -12,40 +12,39 @@ compare_by_steps <- function(trainings, level) {
       interrupted = of_each(function(one) one$interrupted, NA)
     )
   }, trainings, names(trainings))))
+  notes <- if (any(runs$interrupted)) interrupted_note(sum(runs$interrupted))
+  runs <- runs[!runs$interrupted, names(runs) != "interrupted"]
+  if (!nrow(runs)) {
+    gym_abort("There is nothing to compare: all runs were interrupted.",
+              class = "gym_error_argument", argument = "...", call = call)
+  }
   key <- paste(runs$training, runs$env_id, sep = "\r")
-  each <- lapply(split(runs, factor(key, unique(key))), function(own) {
-    curve <- kaplan_meier(own$steps, own$reached, !own$reached & !own$interrupted, level)
-    first_under <- function(values) curve$steps[which(values <= 0.5)[1L]]
-    list(
-      table = data.frame(
-        training = own$training[[1L]], env_id = own$env_id[[1L]], runs = nrow(own),
-        reached = sum(own$reached), median = first_under(curve$survival),
-        lower = first_under(curve$lower), upper = first_under(curve$upper)
-      ),
-      profile = data.frame(
-        training = own$training[[1L]], env_id = own$env_id[[1L]], steps = curve$steps,
-        share = 1 - curve$survival, lower = 1 - curve$upper, upper = 1 - curve$lower
-      )
-    )
-  })
-  bind <- function(name) do.call(rbind, unname(lapply(each, `[[`, name)))
-  list(by = "steps", table = bind("table"), runs = runs, profile = bind("profile"))
+  profiles <- lapply(split(runs, factor(key, unique(key))), reached_profile, level)
+  list(
+    by = "steps", table = do.call(rbind, unname(lapply(profiles, attr, "summary"))), runs = runs,
+    profile = do.call(rbind, unname(profiles)), notes = notes
+  )
 }
 
-#' Estimate the share that has not reached the target after so many steps
-#' @param failed Which runs will never reach it, however many steps they get.
-#' @return A data frame with a row for 0 steps and for each number at which a run ended: `steps`,
-#'   `survival`, and the interval `lower` and `upper`, `NA` if all or none are left.
+interrupted_note <- function(count) paste(count_of(count, "interrupted run"), "left out")
+
+#' Compute the share of runs that have reached the target after so many steps
+#' @param runs The runs of one training in one environment.
+#' @return A data frame with a row for 0 steps and for each number at which a run ended: `training`,
+#'   `env_id`, `steps`, `share`, `lower`, `upper`. Its attribute `summary` is the row of the table.
 #' @noRd
-kaplan_meier <- function(steps, reached, failed, level) {
-  at <- sort(unique(steps))
-  left <- vapply(at, function(t) sum(steps >= t | failed), 0)
-  ended <- vapply(at, function(t) sum(reached & steps == t), 0)
-  survival <- cumprod(1 - ended / left)
-  variance <- cumsum(ended / (left * (left - ended)))
-  half <- stats::qnorm((1 + level) / 2) * sqrt(variance) / log(survival)
-  inside <- survival > 0 & survival < 1
-  bound <- function(side) c(NA, ifelse(inside, survival^exp(side * half), NA))
-  # log(survival) is below 0.
-  data.frame(steps = c(0, at), survival = c(1, survival), lower = bound(-1), upper = bound(1))
+reached_profile <- function(runs, level) {
+  steps <- c(0, sort(unique(runs$steps)))
+  reached <- vapply(steps, function(most) sum(runs$reached & runs$steps <= most), 0L)
+  interval <- vapply(reached, wilson_interval, numeric(2), nrow(runs), level)
+  first_half <- function(shares) steps[which(shares >= 0.5)[1L]]
+  own <- runs[1L, c("training", "env_id")]
+  profile <- data.frame(
+    own, steps = steps, share = reached / nrow(runs), lower = interval[1L, ],
+    upper = interval[2L, ], row.names = NULL
+  )
+  structure(profile, summary = data.frame(
+    own, runs = nrow(runs), reached = sum(runs$reached), median = first_half(profile$share),
+    lower = first_half(profile$upper), upper = first_half(profile$lower), row.names = NULL
+  ))
 }

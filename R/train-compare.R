@@ -29,10 +29,9 @@
 #'
 #' Trainings that stop at a target all score about that target. They are compared by the steps that
 #' they needed to reach it. A run whose final evaluation reached it needed all of its steps. A run
-#' whose final evaluation did not reach it has failed: it never reaches the target. An interrupted
-#' run is censored: it needs more steps than it had. The share of runs that have reached the target
-#' after so many steps is estimated as in Kaplan and Meier (1958), with Greenwood's variance on the
-#' scale of log(-log).
+#' whose final evaluation did not reach it has failed: it never reaches the target. Interrupted runs
+#' are left out. The intervals of the share of runs that have reached the target after so many steps
+#' are Wilson's; those of the median are where they contain one half.
 #'
 #' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
 #'   one agent in several environments have the same name. Or one data frame as returned by
@@ -57,7 +56,7 @@
 #'       environment: `training`, `env_id`, `runs`, `reached` (the number of runs, an integer),
 #'       `median`, `lower`, `upper` (steps, `NA` if fewer than half have reached the target).}
 #'     \item{runs}{A data frame with a row for each run: `training`, `env_id`, `seed`, `steps`, and
-#'       `score`, or `reached` and `interrupted` (logicals).}
+#'       `score`, or `reached` (a logical).}
 #'     \item{improvement}{For scores, a data frame with a row for each pair: `training`, `than`,
 #'       `probability`, `lower`, `upper`.}
 #'     \item{profile}{A data frame of the curves that [plot()][plot.gym_comparison()] shows:
@@ -72,8 +71,8 @@
 #' @references R. Agarwal, M. Schwarzer, P. S. Castro, A. Courville and M. G. Bellemare (2021), Deep
 #'   reinforcement learning at the edge of the statistical precipice, NeurIPS 34,
 #'   <https://arxiv.org/abs/2108.13264>; code: <https://github.com/google-research/rliable>.
-#'   E. L. Kaplan and P. Meier (1958), Nonparametric estimation from incomplete observations,
-#'   Journal of the American Statistical Association 53, 457-481.
+#'   E. B. Wilson (1927), Probable inference, the law of succession, and statistical inference,
+#'   Journal of the American Statistical Association 22, 209-212.
 #' @seealso [learning_curves()], [sweep_agent()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -113,7 +112,7 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
     total_steps = total_steps, level = level, reps = as.integer(reps), seed = seed %||% draw_seed()
   )
   compared <- if (stop_at_target(trainings, call)) {
-    compare_by_steps(trainings, level)
+    compare_by_steps(trainings, level, call)
   } else {
     compare_by_scores(trainings, curves %||% curves_of(trainings), settings, reference, call)
   }
@@ -139,9 +138,7 @@ curves_of <- function(trainings) {
 }
 
 check_are_trainings <- function(given, call) {
-  wrong <- Filter(function(x) {
-    !inherits(x, c("gym_training", "gym_trainings", "gym_searches"))
-  }, given)
+  wrong <- Filter(function(x) !inherits(x, c("gym_training", "gym_trainings")), given)
   if (!length(wrong)) {
     return()
   }
@@ -295,7 +292,7 @@ comparison_lines <- function(x, pairs = TRUE) {
         paste0("stratified bootstrap, ", count_of(x$reps, "draw"), ", repeated by `seed = ",
                format(x$seed, scientific = FALSE), "`")
       } else {
-        "Kaplan-Meier"
+        "Wilson's"
       }
     ),
     if (pairs) improvement_lines(x$improvement, interval),

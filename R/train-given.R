@@ -15,7 +15,7 @@ arguments_as_written <- function(first, frame = rlang::caller_env(), call = fram
   }
   written <- as.list(eval(call("substitute", listed), frame))[-1L]
   for (value in values[!nzchar(rlang::names2(values))]) {
-    if (!inherits(value, c("gym_rollout", "gym_training", "gym_trainings", "gym_searches"))) {
+    if (!inherits(value, c("gym_rollout", "gym_training", "gym_trainings"))) {
       must <- "a result as the others, or have a name, such as `type = `"
       abort_argument(value, must, "...", call)
     }
@@ -42,7 +42,7 @@ result_label <- function(x) {
     policy_label(x$policy)
   } else if (rlang::is_string(x)) {
     tools::file_path_sans_ext(basename(x))
-  } else if (inherits(x, c("gym_training", "gym_trainings", "gym_searches"))) {
+  } else if (inherits(x, c("gym_training", "gym_trainings"))) {
     training_label(x)
   } else {
     ""
@@ -67,7 +67,7 @@ only_results <- function(values, class, call = rlang::caller_env(), unique = TRU
 }
 
 given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {
-  if (any(vapply(values, inherits, NA, c("gym_search", "gym_searches")))) {
+  if (any(vapply(values, inherits, NA, "gym_search"))) {
     gym_abort(
       c(paste("A search by `search_random()` has no evaluations that could be compared with those",
               "of a training."),

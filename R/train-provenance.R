@@ -4,8 +4,8 @@
 #' differ in the last bits between machines), environment, seeds and time. `provenance()` returns
 #' this record, also for a checkpoint file.
 #'
-#' @param x The result of [rollout()], [evaluate_policy()], [train_agent()], [search_random()] or
-#'   [search_repeat()]; or the file of a checkpoint, a string.
+#' @param x The result of [rollout()], [evaluate_policy()], [train_agent()] or [search_random()]; or
+#'   the file of a checkpoint, a string.
 #' @param ... Not used.
 #' @return An object of class `gym_provenance`, which prints a line for each element. It is a list
 #'   of

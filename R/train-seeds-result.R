@@ -96,7 +96,7 @@ summary.gym_trainings <- function(object, ...) {
     list(
       trainings = object, finished = nrow(done), stopped_early = sum(done$stopped_early),
       reached = sum(done$reached), lower = interval[[1L]], upper = interval[[2L]],
-      returns = quartiles(done$mean_return), steps = quartiles(done$steps)
+      returns = quartiles(stats::na.omit(done$mean_return)), steps = quartiles(done$steps)
     ),
     class = "summary.gym_trainings"
   )
@@ -159,7 +159,9 @@ print.summary.gym_trainings <- function(x, ...) {
   print(x$trainings)
   if (x$finished > 0L) {
     cat("\n")
-    print(signif(rbind(`mean return` = x$returns, steps = x$steps), 4L))
+    # Searches have no final evaluations.
+    returns <- if (!anyNA(x$returns)) x$returns
+    print(signif(rbind(`mean return` = returns, steps = x$steps), 4L))
   }
   invisible(x)
 }

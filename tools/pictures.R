@@ -29,7 +29,6 @@ draw("search", cartpole$search)
 draw("network", policy)
 draw("network-wide", policy_network(c(24, 16, 16, 4)))
 draw("decision-output", cartpole$map)
-draw("landscape", cartpole$landscape)
 draw("luck", cartpole$searches)
 draw("training", trained$one)
 agents <- trained$trained

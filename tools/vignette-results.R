@@ -24,8 +24,7 @@ results$map <- decision_map(
   "CartPole-v0", results$search$policy, "pole_angle", "pole_angular_velocity",
   path = results$episode
 )
-results$landscape <- search_landscape(results$search, seed = 1)
-results$searches <- search_repeat("CartPole-v0", seeds = 1:500)
+results$searches <- search_random("CartPole-v0", seeds = 1:500)
 
 env <- gym_make("CartPole-v0")
 observation <- env$reset(seed = 1)
@@ -54,12 +53,18 @@ strip <- function(search) {
   search$client <- NULL
   search
 }
+# 500 searches with their episodes and policies have megabytes.
+results$searches$trainings <- lapply(results$searches$trainings, function(search) {
+  kept <- c("seed", "history", "solved", "stopped_early", "steps", "elapsed", "interrupted", "env_id")
+  search$history <- search$history["iteration"]
+  structure(search[kept], class = class(search))
+})
 results$search <- strip(results$search)
 results$summary$search <- results$search
 
 saveRDS(results, "vignettes/results.rds", compress = "xz", version = 3)
 
-print(summary(results$searches))
+print(as.data.frame(results$searches)[1:5, ])
 cat(sprintf(
   "random policy: mean return %.2f, median %.1f over %d episodes\n",
   mean(results$random$episodes$return), stats::median(results$random$episodes$return),

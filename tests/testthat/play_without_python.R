@@ -73,8 +73,7 @@ for (env in list(point, "Point-v0", walk)) {
     stopifnot(is.null(again$client)),
     plot(found),
     summary(found, episodes = 2),
-    search_repeat(env, rounds = 2, episodes = 1, max_steps = 3, target = 9, seeds = 1:2),
-    plot(search_landscape(found, size = 3, episodes = 1)),
+    search_random(env, rounds = 2, episodes = 1, max_steps = 3, target = 9, seeds = 1:2),
     plot(found$policy, env),
     as_vector_env(env)
   )

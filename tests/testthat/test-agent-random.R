@@ -102,8 +102,14 @@ test_that("many searches are trainings, too, and each says whether it was solved
   env <- fake_environment(reward = first_action)
   trained <- train_agent(agent_random(), env, policy_network(), iterations = 4, episodes = 3,
                          target = 11, seeds = 1:4, solved_by = "candidate")
-  searches <- search_repeat(env, rounds = 4, episodes = 3, target = 11, seeds = 1:4)
-  expect_identical(as.data.frame(trained)$reached, as.data.frame(searches)$solved)
+  searches <- search_random(env, rounds = 4, episodes = 3, target = 11, seeds = 1:4)
+  for (i in 1:4) {
+    alone <- search_random(env, rounds = 4, episodes = 3, target = 11, seed = i)
+    parts <- c("solved", "round", "rounds", "episodes", "policy")
+    expect_identical(trained$trainings[[i]][parts], alone[parts])
+    expect_identical(searches$trainings[[i]][parts], alone[parts])
+  }
+  expect_setequal(as.data.frame(searches)$reached, c(TRUE, FALSE))
   expect_output(print(trained), "Reached the target 11 with [0-9] of 4 seeds")
 })
 
@@ -306,7 +312,7 @@ test_that("only who names an environment that is out of date is told so", {
     search(..., rounds = 1, episodes = 1, client = client)
   }
   expect_no_warning(searched(search_random, seed = 1))
-  expect_no_warning(searched(search_repeat, seeds = 1))
+  expect_no_warning(searched(search_random, seeds = 1))
   warned <- expect_warning(
     searched(search_random, "CartPole-v0", seed = 1), class = "gym_warning_gymnasium"
   )

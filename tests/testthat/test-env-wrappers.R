@@ -89,9 +89,8 @@ test_that("titles and prints name the wrappers of what was played", {
   map <- decision_map(car, policy)
   search <- search_random(car, policy, rounds = 2, episodes = 1, target = -100, seed = 1,
                           progress = FALSE)
-  repeated <- search_repeat(car, policy, rounds = 2, episodes = 1, target = -100, seeds = 1:2,
+  repeated <- search_random(car, policy, rounds = 2, episodes = 1, target = -100, seeds = 1:2,
                             progress = FALSE)
-  landscape <- search_landscape(search, size = 3, episodes = 1, seed = 1, progress = FALSE)
   train <- function(env) {
     train_agent(agent_hill_climb(), env, policy = policy, iterations = 2, eval_every = 1,
                 eval_episodes = 2, target = Inf, seed = 1, progress = FALSE)
@@ -102,12 +101,12 @@ test_that("titles and prints name the wrappers of what was played", {
   plotted <- list(
     title(played), title(played, type = "trajectory"), title(a = played, b = played), title(map),
     title(evaluate_policy(car, policy, 2, seed = 1)), title(search), title(repeated),
-    title(landscape), title(search$policy), title(trained), title(compared),
+    title(search$policy), title(trained), title(compared),
     title(a = trained, b = trained)
   )
   for (shown in plotted) expect_match(shown, name, fixed = TRUE)
   objective <- gym_objective(car, policy, episodes = 1, seed = 1)
-  for (result in list(played, map, search, repeated, landscape, trained, compared, objective)) {
+  for (result in list(played, map, search, repeated, trained, compared, objective)) {
     expect_output(print(result), name, fixed = TRUE)
   }
   # What differs by its wrapper alone stays in one panel.

@@ -41,7 +41,7 @@ test_that("max_steps beyond the environment's own limit is warned of, with what 
   plays <- list(
     function(steps) rollout(env, policy_random(), max_steps = steps),
     function(steps) search_random(env, network, rounds = 1, max_steps = steps),
-    function(steps) search_repeat(env, network, 1, target = 1, seeds = 1:3, max_steps = steps)
+    function(steps) search_random(env, network, 1, target = 1, seeds = 1:3, max_steps = steps)
   )
   for (play in plays) {
     expect_silent(play(NULL))

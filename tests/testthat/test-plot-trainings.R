@@ -152,6 +152,35 @@ test_that("trainings that were evaluated once are a point and a bar", {
   expect_equal(unlist(bar[c("y", "ymin", "ymax")]), c(y = 2, ymin = 1.5, ymax = 2.5))
 })
 
+test_that("bars count the seeds by the iterations that they needed to reach the target", {
+  ended <- function(iterations, solved, interrupted = FALSE) {
+    training <- training_of(seq_len(iterations), rep(1, iterations))
+    training[c("solved", "interrupted")] <- list(solved, interrupted)
+    training
+  }
+  some <- trainings_of(ended(1, TRUE), ended(3, TRUE), ended(1, TRUE), ended(9, FALSE),
+                       ended(2, NA, TRUE))
+  picture <- drawn(autoplot(some, type = "iterations"))
+  bars <- layers_of(picture, "GeomBar")[[1]]
+  expect_identical(bars$count[order(bars$x)], c(2, 0, 1))
+  expect_equal(sort(bars$x), 1:3)
+  expect_identical(picture$labels$subtitle, "3 of 4 seeds have reached the target")
+  two <- drawn(autoplot(A = some, B = trainings_of(ended(5, FALSE)), type = "iterations"))
+  panels <- ggplot2::ggplot_build(two)$layout$layout$panel
+  expect_identical(as.character(panels), c("A: 3 of 4", "B: 0 of 1"))
+  expect_error(autoplot(trainings_of(ended(5, FALSE)), type = "iterations"), "no seed has reached",
+               class = "gym_error_argument")
+  expect_error(autoplot(some, type = "steps"), "`type`", class = "gym_error_argument")
+})
+
+test_that("searches with many seeds plot the rounds that they needed", {
+  env <- fake_environment(reward = first_action)
+  searches <- search_random(env, rounds = 4, episodes = 3, target = 11, seeds = 1:4)
+  picture <- drawn(autoplot(searches))
+  expect_identical(picture$labels$x, "rounds to the target")
+  expect_error(autoplot(searches, type = "returns"), "was evaluated", class = "gym_error_argument")
+})
+
 test_that("a search among them is refused, with or without a name", {
   search <- search_random(fake_environment(), rounds = 2, seed = 1)
   trained <- training_of(c(10, 20), c(1, 2))

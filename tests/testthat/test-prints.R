@@ -127,15 +127,10 @@ test_that("a search that found and one that did not, and their summaries", {
   expect_printed(search_random(one_step(), episodes = 2, rounds = 3, target = 9, seed = 4))
 })
 
-test_that("repeated searches and their summary", {
-  searches <- search_repeat(one_step(), episodes = 2, rounds = 5, target = 1, seeds = 4:6)
+test_that("searches with many seeds and their summary", {
+  searches <- search_random(one_step(), episodes = 2, rounds = 5, target = 1, seeds = 4:6)
   expect_printed(searches)
   expect_printed(summary(searches))
-})
-
-test_that("a landscape", {
-  search <- search_random(one_step(), episodes = 2, rounds = 2, target = 9, seed = 1)
-  expect_printed(search_landscape(search, size = 3, episodes = 2, seed = 1))
 })
 
 test_that("a decision map", {
@@ -171,13 +166,10 @@ test_that("results are printed without times if the user leaves them out", {
   env <- fake_environment(reward = first_action)
   trained <- train_agent(agent_ars(3, 2), env, iterations = 1, seeds = 1:2, target = Inf,
                          eval_episodes = 2)
-  searches <- search_repeat(env, rounds = 2, target = 9, seeds = 1:2)
   search <- search_random(env, rounds = 2, target = 9, seed = 1)
-  landscape <- search_landscape(search, size = 3, episodes = 1)
   results <- list(
-    trained, trained$trainings[[1]], summary(trained), summary(trained$trainings[[1]]), searches,
-    summary(searches), search, summary(search, episodes = 2, seed = 1), landscape,
-    provenance(trained), provenance(trained$trainings[[1]])
+    trained, trained$trainings[[1]], summary(trained), summary(trained$trainings[[1]]),
+    search, summary(search, episodes = 2, seed = 1), provenance(trained), provenance(trained$trainings[[1]])
   )
   times <- "[0-9] (s|min)\\b|[0-9]:[0-9]|elapsed"
   for (result in results) {

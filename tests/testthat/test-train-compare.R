@@ -191,6 +191,11 @@ test_that("trainings that stop at a target are compared by steps", {
   expect_identical(compared$table$median, c(30, NA))
   expect_output(print(compared), "Steps to the target in A, 6 seeds each", fixed = TRUE)
   expect_output(print(compared), "4 of 6")
+  # Wilson's intervals contain one half from the first number of steps to the second.
+  expect_identical(compared$table$lower, c(10, 40))
+  expect_identical(compared$table$upper, c(NA_real_, NA_real_))
+  bounds <- compared$profile[compared$profile$steps == 30 & compared$profile$training == "quick", ]
+  expect_equal(unlist(bounds[c("lower", "upper")], use.names = FALSE), wilson_interval(3, 6))
   inf <- trainings_with(1:5)
   expect_error(compare_trainings(quick, inf), "target = Inf", class = "gym_error_argument")
   other <- trainings_with(rep(9, 6), target = 8, steps = 10)
@@ -210,7 +215,7 @@ test_that("a run that failed counts as one that never reaches the target, wherev
   # The last runs overshoot the budget, so that the one that failed has fewer steps.
   expect_equal(share_at_the_end(c(10, 20, 30, 50, 55, 60)), 5 / 6)
   expect_equal(share_at_the_end(c(10, 20, 30, 70, 55, 60)), 5 / 6)
-  # An interrupted run has not failed.
+  # An interrupted run has not failed, it is left out.
   expect_equal(share_at_the_end(c(10, 20, 30, 50, 55, 60), interrupted = 1:6 == 4), 1)
 })
 
@@ -243,18 +248,4 @@ test_that("many pairs are not printed", {
   expect_identical(nrow(compared$improvement), 10L)
   expect_output(print(compared), "Probabilities of 10 pairs")
   expect_lt(length(capture.output(print(compared))), 15)
-})
-
-test_that("the estimate of Kaplan and Meier is that of package survival", {
-  steps <- c(3, 5, 5, 8, 8, 10, 12, 12, 15, 20)
-  reached <- c(1, 1, 0, 1, 1, 0, 1, 0, 1, 0) == 1
-  own <- kaplan_meier(steps, reached, FALSE, 0.9)
-  # survfit(Surv(steps, reached) ~ 1, conf.type = "log-log", conf.int = 0.9), survival 3.5-3
-  expect_equal(own$steps, c(0, 3, 5, 8, 10, 12, 15, 20))
-  expect_equal(own$survival[-1], c(0.9, 0.8, 0.571428571, 0.571428571, 0.428571429, 0.214285714,
-                                   0.214285714), tolerance = 1e-8)
-  expect_equal(own$lower[-1], c(0.579140925, 0.488830228, 0.272695358, 0.272695358, 0.154685368,
-                                0.025202831, 0.025202831), tolerance = 1e-8)
-  expect_equal(own$upper[-1], c(0.979881719, 0.932796125, 0.785832901, 0.785832901, 0.680682461,
-                                0.524825691, 0.524825691), tolerance = 1e-8)
 })

@@ -19,7 +19,7 @@ test_that("a result of each kind says where it comes from", {
     expect_s3_class(provenance(result)$started, "POSIXct")
     expect_identical(provenance(result)$elapsed, result$elapsed)
   }
-  repeated <- provenance(search_repeat(env, rounds = 2, target = 1, seeds = c(7, 9)))
+  repeated <- provenance(search_random(env, rounds = 2, target = 1, seeds = c(7, 9)))
   expect_identical(repeated$seed, c(7, 9))
 })
 

@@ -54,7 +54,7 @@ test_that("a large seed is one everywhere", {
   expect_identical(play(large)$seed, large)
   expect_identical(play(large)$steps, play(large)$steps)
   expect_false(identical(play(large)$steps, play(large + 1)$steps))
-  repeated <- search_repeat(env, policy_network(c(1, 1)), rounds = 1, episodes = 1, target = 9,
+  repeated <- search_random(env, policy_network(c(1, 1)), rounds = 1, episodes = 1, target = 9,
                             seeds = c(1, large))
   expect_identical(as.data.frame(repeated)$seed, c(1, large))
   trained <- train_agent(agent_cem(4, 2), env, iterations = 1, seeds = c(1, large), target = 9,
