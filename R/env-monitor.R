@@ -24,13 +24,13 @@
 #'   directory with the files of an earlier monitor.
 #' @param video_callable Which episodes to record as videos: `FALSE`, the default, for none, `TRUE`
 #'   for all, or a whole number n for every n-th, starting with the first. Requires the server's
-#'   extra `video` (the Python package moviepy).
+#'   extra `video` (the Python package moviepy). The server keeps the frames of an episode in memory
+#'   until it ends: a thousand frames of CartPole are 720 MB.
 #' @return Nothing, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance, a directory that is refused, a
-#'   monitor that is already active, or videos that cannot be made, with the reason.
-#'   `gym_error_http_429` if all monitors together have written as much as the server allows
-#'   (`max_monitor_mb` of [gym_server_start()]): a monitor then stops recording, the environment
-#'   goes on, and closing either raises the error. `gym_error_argument`; `gym_error_connection`.
+#'   monitor that is already active, or videos that cannot be made, with the reason. If something
+#'   could not be recorded, the environment goes on, and closing either raises the error.
+#'   `gym_error_argument`; `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

@@ -43,6 +43,8 @@ def set_up(level: str | int, about_process: str = "") -> None:
     logging.basicConfig(level=level, handlers=[handler])
     # Each time, and not once in the life of a process: each client is to get them.
     warnings.filterwarnings("always", _GYMNASIUM)
+    # Gymnasium's recorder finds the directory that a monitor has made for it.
+    warnings.filterwarnings("ignore", f"{_GYMNASIUM}Overwriting existing videos")
     warnings.showwarning = _show_warning
 
 

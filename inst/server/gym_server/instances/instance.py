@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.monitoring.recording import Recording
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.lock import InstanceLock
@@ -66,7 +65,6 @@ class Instance(Watchable):
         self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
         self._created = self.lock.used
-        self._recording = Recording(self._close_monitor)
 
     # Resets and steps -----------------------------------------------------------------------
 
@@ -102,7 +100,6 @@ class Instance(Watchable):
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
-            self._recording.stop_if_full()
             return self._reset(seed, options, form, mask)
 
     def step(
@@ -229,7 +226,7 @@ class Instance(Watchable):
     @property
     def pids(self) -> Sequence[int]:
         """The processes that run it, besides the server's."""
-        raise NotImplementedError
+        return ()
 
     # Monitors -------------------------------------------------------------------------------
 
@@ -245,15 +242,12 @@ class Instance(Watchable):
                 "create it without num_envs",
             )
         with self.lock:
-            path, disk_use = root.resolve(directory), root.disk_use
-            disk_use.check(path, emptied=force)
-            self.record(path, directory, force, resume, video_every)
-            self._recording.begin(path, disk_use)
+            self._record(root.resolve(directory), directory, force, resume, video_every)
 
-    def record(
+    def _record(
         self, path: Path, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        """Record the episodes that start from now on; the caller holds the lock.
+        """Record the episodes that start from now on.
 
         Args:
             path: the directory, already checked; see ``take_directory()``, also for the next three.
@@ -268,10 +262,9 @@ class Instance(Watchable):
         """Stop recording, if active, and finish the files.
 
         Raises:
-            GymServerError: ``monitors_full`` if episodes were not recorded for that reason;
-                ``monitor_directory`` if something could not be written.
+            GymServerError: ``monitor_directory`` if something could not be written.
         """
-        with self.lock, self._recording.ends():
+        with self.lock:
             self._close_monitor()
 
     # Beginning and end ----------------------------------------------------------------------
@@ -295,8 +288,7 @@ class Instance(Watchable):
             why = self.lock.refusal()
             self.lock.closed = True
             self.viewer.end(why)
-            with self._recording.ends():
-                self._close(why)
+            self._close(why)
 
     def abandon(self, why: GymServerError) -> int | None:
         """Close the instance without waiting for its lock: a call on it has taken too long.

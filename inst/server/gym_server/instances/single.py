@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,10 +108,10 @@ class SingleInstance(LocalInstance):
 
     # Monitors -------------------------------------------------------------------------------
 
-    def record(
+    def _record(
         self, path: Path, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        """Record the episodes that start from now on; see ``Instance.record()``."""
+        """Record the episodes that start from now on; see ``Instance._record()``."""
         if self._monitor is not None:
             raise GymServerError(
                 "monitor_active",
@@ -127,12 +127,6 @@ class SingleInstance(LocalInstance):
         monitor, self._monitor = self._monitor, None
         if monitor is not None:
             monitor.close()
-
-    @property
-    def pids(self) -> Sequence[int]:
-        """The process that encodes a video, if any."""
-        monitor = self._monitor
-        return monitor.pids if monitor is not None else ()
 
     # The end --------------------------------------------------------------------------------
 

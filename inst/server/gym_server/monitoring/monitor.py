@@ -8,12 +8,14 @@ import time
 from collections.abc import Callable
 
 import gymnasium
+import numpy as np
+from gymnasium.wrappers import RecordVideo
 
 from gym_server.envs.extras import how_to_install
 from gym_server.envs.outcomes import reward_number
 from gym_server.errors import GymServerError
 from gym_server.monitoring.monitor_directory import TABLE, MonitorDirectory
-from gym_server.monitoring.video import Video
+from gym_server.rendering.png import picture
 
 log = logging.getLogger(__name__)
 
@@ -44,26 +46,23 @@ class Monitor:
                 ``require_video()``.
             draw: draws the environment.
         """
-        self._env = env
         self._directory = directory
         self._rows = csv.writer(directory.table, lineterminator="\n")
-        self._video_every = video_every
-        self._draw = draw
-        self._video: Video | None = None
+        self._videos: _Videos | None = None
+        if video_every:
+            drawn = _Drawn(env, draw, self._remember)
+            self._videos = _Videos(drawn, directory, video_every, self._remember)
+        self._env = self._videos or env
         self._episode: int | None = None
         self._episodes = 0
         self._failure: Exception | None = None
 
     def reset(self, *, seed: int | None, options: dict | None) -> tuple:
         """Reset the environment and start to record an episode."""
-        self._finish_video()
         self._episode = None
-        number = self._directory.next_episode
         result = self._env.reset(seed=seed, options=options)
-        if self._video_every and number % self._video_every == 0:
-            self._record(self._start_video, number)
-        self._directory.next_episode = number + 1
-        self._episode = number
+        self._episode = self._directory.next_episode
+        self._directory.next_episode += 1
         self._return = 0.0
         self._length = 0
         self._started = time.perf_counter()
@@ -72,8 +71,6 @@ class Monitor:
     def step(self, action: object) -> tuple:
         """Take a step; write a row if the episode ends."""
         result: tuple = self._env.step(action)
-        if self._video is not None:
-            self._record(self._video.add)
         if self._episode is not None:
             _, reward, terminated, truncated, _ = result
             self._return += reward_number(reward)
@@ -99,12 +96,6 @@ class Monitor:
                 f"The recording in {self._directory.path} is incomplete: {self._failure}",
             ) from self._failure
 
-    @property
-    def pids(self) -> tuple[int, ...]:
-        """The process that encodes the current video, if any."""
-        video = self._video
-        return (video.pid,) if video is not None else ()
-
     def about(self) -> dict:
         """Return where the monitor writes, and how many episodes it has written."""
         return {
@@ -126,33 +117,61 @@ class Monitor:
             self._remember(error)
         self._finish_video()
 
-    def _start_video(self, number: int, frame: object) -> None:
-        self._directory.check()
-        path = self._directory.path / f"rl-video-episode-{number}.mp4"
-        self._video = Video(path, self._env.metadata.get("render_fps", 30), frame)
-        self._video.add(frame)
-
-    def _record(self, add: Callable[..., None], *args: object) -> None:
-        frame = self._draw()
-        # Not on the render thread, which others may need: encoding does not draw.
-        try:
-            add(*args, frame)
-        except Exception as error:
-            self._remember(error)
-            self._finish_video()
-
     def _finish_video(self) -> None:
-        video, self._video = self._video, None
-        try:
-            if video is not None:
-                video.close()
-        except Exception as error:
-            self._remember(error)
+        if self._videos is not None and self._videos.recording:
+            self._videos.stop_recording()
 
     def _remember(self, error: Exception) -> None:
         # The step or reset itself succeeded and must be answered; close() raises the error.
         self._failure = self._failure or error
         log.error("A monitor in %s lost something", self._directory.path, exc_info=error)
+
+
+class _Videos(RecordVideo):
+    """Gymnasium's videos; one that cannot be written costs no step."""
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        directory: MonitorDirectory,
+        every: int,
+        remember: Callable[[Exception], None],
+    ) -> None:
+        super().__init__(env, str(directory.path), lambda number: number % every == 0)
+        self.episode_id = directory.next_episode - 1
+        self._remember = remember
+
+    def stop_recording(self) -> None:
+        """Write the video."""
+        try:
+            super().stop_recording()  # type: ignore[no-untyped-call]
+        except Exception as error:
+            self._remember(error)
+            self.recorded_frames, self.recording = [], False
+
+
+class _Drawn(gymnasium.Wrapper):
+    """Draws for ``RecordVideo``, which ends a video when it gets no picture."""
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        draw: Callable[[], object],
+        remember: Callable[[Exception], None],
+    ) -> None:
+        super().__init__(env)
+        self._draw = draw
+        self._remember = remember
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture in RGB; None if there is none."""
+        try:
+            pixels = picture(self._draw())
+        except Exception as error:
+            self._remember(error)
+            return None
+        # Turns grey into RGB, and drops the last channel of RGBA.
+        return np.broadcast_to(pixels[:, :, :3], (*pixels.shape[:2], 3))
 
 
 def require_video(env: gymnasium.Env) -> None:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import math
+import errno
 import os
 import re
-import stat
+import sys
 import tempfile
 import threading
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import TextIO
+from typing import IO, TextIO
 
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief
-from gym_server.monitoring.disk_use import DiskUse, own_directories
-from gym_server.monitoring.file_lock import try_lock
 
 TABLE = "episodes.csv"
 _HEADER = "episode,return,length,seconds\n"
@@ -23,20 +21,17 @@ _HEADER = "episode,return,length,seconds\n"
 # The names of Gymnasium's RecordVideo.
 _VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
 
+# The subdirectory of a monitor that shares its directory with another one.
+_INSTANCE_ID = re.compile("[0-9a-f]{8}")
+
 # Monitors never count higher, and file names could become too long.
 _MOST_EPISODES = 10**15
 
 
 class MonitorRoot:
-    """The directories that a server's monitors may write to.
+    """The directories that a server's monitors may write to."""
 
-    Attributes:
-        disk_use: how much they have written, and may write.
-    """
-
-    def __init__(
-        self, root: Path | None, allow_temporary: bool, most_bytes: float = math.inf
-    ) -> None:
+    def __init__(self, root: Path | None, allow_temporary: bool) -> None:
         """Set the limits.
 
         Args:
@@ -44,9 +39,7 @@ class MonitorRoot:
                 temporary directory, created when the first monitor starts.
             allow_temporary: whether absolute ones may also be below the system's temporary
                 directory, as in the classic examples.
-            most_bytes: how much all monitors together may write.
         """
-        self.disk_use = DiskUse(most_bytes)
         self._root = root
         self._own_root: Path | None = None
         self._allowed: list[Path] = []
@@ -62,8 +55,6 @@ class MonitorRoot:
         Raises:
             GymServerError: ``monitor_directory`` if monitors may not write there.
         """
-        if "\0" in directory:
-            raise _refuse(directory, "it contains a NUL")
         if ".." in PurePosixPath(directory).parts or ".." in PureWindowsPath(directory).parts:
             raise _refuse(directory, "it contains '..'")
         try:
@@ -121,9 +112,9 @@ class MonitorDirectory:
             self._is_new = not path.exists()
             with contextlib.ExitStack() as undo:
                 table = undo.enter_context(
-                    open(path, "a+", encoding="ascii", errors="replace", newline="", opener=_opener)
+                    open(path, "a+", encoding="ascii", errors="replace", newline="")
                 )
-                if not try_lock(table):
+                if not _try_lock(table):
                     return False
                 # Otherwise another monitor deleted the file after it was opened here.
                 if _is_at(table, path):
@@ -148,12 +139,8 @@ class MonitorDirectory:
             OSError: it was removed, or cannot be written.
         """
         with self.table:
-            self.check()
-
-    def check(self) -> None:
-        """Raise FileNotFoundError if the table was removed: others may write there by now."""
-        if not _is_at(self.table, self.path / TABLE):
-            raise FileNotFoundError(f"{TABLE} was removed")
+            if not _is_at(self.table, self.path / TABLE):
+                raise FileNotFoundError(f"{TABLE} was removed")
 
     def prepare(self, force: bool, resume: bool) -> None:
         """Keep, delete or refuse an earlier monitor's files; then start the table.
@@ -207,9 +194,6 @@ class MonitorDirectory:
                 f"it holds {foreign[0]}, which no monitor of this server wrote",
                 "move that file away, or use another directory",
             )
-        for name in (TABLE, *found):
-            if not stat.S_ISREG((self.path / name).lstat().st_mode):
-                raise _refuse(self.path, f"{name} is not a regular file")
         return found
 
     @property
@@ -249,8 +233,6 @@ def take_directory(
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
-        if path.resolve() != path:
-            raise _refuse(directory, "it leads elsewhere")
         taken = _take(path, path / instance_id, resume and not force)
         try:
             taken.prepare(force, resume)
@@ -275,7 +257,7 @@ def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
 
 
 def _empty_those_of_gone_monitors(path: Path) -> None:
-    for one in own_directories(path):
+    for one in [path / name for name in os.listdir(path) if _INSTANCE_ID.fullmatch(name)]:
         other = MonitorDirectory(one)
         # A monitor that is just starting has locked its table before it writes to it.
         has_begun = (one / TABLE).exists() and (one / TABLE).stat().st_size > 0
@@ -292,15 +274,46 @@ def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServe
     )
 
 
-def _opener(path: str, flags: int) -> int:
-    # Follow no link, and if it is a named pipe, do not wait for a reader.
-    careful = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-    return os.open(path, flags | careful, 0o666)
-
-
 def _is_at(file: TextIO, path: Path) -> bool:
     """Return whether an open file is the one at a path."""
     try:
         return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
     except FileNotFoundError:
         return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    # Windows prevents others from reading a locked part, so lock one far behind the file's end.
+    _FAR_BEHIND = 2**30
+
+    def _lock(descriptor: int) -> None:
+        os.lseek(descriptor, _FAR_BEHIND, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_END)
+
+else:
+    import fcntl
+
+    def _lock(descriptor: int) -> None:
+        # lockf() locks belong to the process, which could take one twice, and they end when any
+        # other handle of the file is closed.
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _try_lock(file: IO) -> bool:
+    """Lock an open file until it is closed; return False if it is already locked.
+
+    Raises:
+        OSError: the file system does not support locks.
+    """
+    try:
+        _lock(file.fileno())
+    except OSError as error:
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK):
+            return False
+        raise
+    return True

@@ -100,25 +100,6 @@ def test_a_link_that_leads_out_is_refused(root, monitor_dir, tmp_path):
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
-@pytest.mark.skipif(os.name != "posix", reason="links")
-@pytest.mark.parametrize("name", ["episodes.csv", "rl-video-episode-0.mp4"])
-def test_a_file_that_became_a_link_is_not_followed(root, tmp_path, name):
-    path = fill(root, videos=[0])
-    (tmp_path / "precious").write_text("precious")
-    (path / name).unlink()
-    (path / name).symlink_to(tmp_path / "precious")
-    refused(root, "run", resume=True)
-    refused(root, "run", force=True)
-    assert (tmp_path / "precious").read_text() == "precious"
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pipes with names")
-def test_a_pipe_of_that_name_is_refused_and_not_waited_for(root, monitor_dir):
-    (monitor_dir / "run").mkdir()
-    os.mkfifo(monitor_dir / "run" / "episodes.csv")
-    refused(root, "run", force=True)
-
-
 def test_a_file_in_the_way_is_refused(root, monitor_dir):
     (monitor_dir / "run").write_text("a file")
     refused(root, "run")
