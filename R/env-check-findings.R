@@ -27,7 +27,6 @@ look_at_environment <- function(check, seed) {
     look_at_reset_without_seed(check, seed)
   }
   look_at_render(check, seed)
-  look_at_copies(check, first, seed)
 }
 
 #' Check whether an environment plays like its model
@@ -146,36 +145,11 @@ look_at_end <- function(check, episodes) {
   }
 }
 
-# A step after the end may fail or have any result, but the next episode must not depend on it.
-look_beyond_end <- function(check, episode, seed) {
-  if (!episode$ended) {
-    return()
-  }
-  env <- check$env
-  action <- episode$actions[[length(episode$actions)]]
-  tryCatch(suppressWarnings(env$step(action)), error = function(cnd) NULL)
-  place <- paste0("`reset(seed = ", seed, ")` after a step beyond the end of an episode")
-  again <- call_and_look(check, "reset", place, env$reset(seed = seed))
-  if (!has_raised(again) && !identical(again, episode$observation) && !is_noted(check, "seeds")) {
-    note_finding(check, "end", paste0(
-      place, " gives another first observation than before: ",
-      difference_text(again, episode$observation), "."
-    ))
-  }
-}
-
-is_noted <- function(check, topic) {
-  any(vapply(check$found, function(finding) finding$topic == topic, NA))
-}
-
 # Seeds ---------------------------------------------------------------------------------
 
 look_at_repetition <- function(check, first, seed) {
   again <- play_and_look(check, seed, first$actions)
-  if (!is.null(again)) {
-    look_at_difference(check, first, again, seed)
-    look_beyond_end(check, again, seed)
-  }
+  if (!is.null(again)) look_at_difference(check, first, again, seed)
 }
 
 look_at_reset_without_seed <- function(check, seed) {
@@ -248,53 +222,4 @@ can_be_drawn <- function(env) {
   } else {
     is.function(env[["render"]])
   }
-}
-
-# Copies ----------------------------------------------------------------------------------
-
-# An environment in R is played in several copies. If they share something outside their `self`,
-# such as another environment that all of them step, one copy moves when another does.
-look_at_copies <- function(check, first, seed) {
-  if (is.null(check$copy) || is_noted(check, "seeds") || !length(first$results)) {
-    return(invisible())
-  }
-  one <- unchecked_functions(check$copy())
-  other <- unchecked_functions(check$copy())
-  differ <- function(i) {
-    action <- first$actions[[i]]
-    out <- one$step(action)
-    if (i <= 10L) other$step(action)
-    alike <- vapply(c("observation", "reward", "terminated"), function(name) {
-      identical(element_of(out, name), element_of(first$results[[i]], name))
-    }, NA)
-    !all(alike)
-  }
-  moved <- tryCatch(
-    suppressWarnings({
-      observation <- one$reset(seed)
-      other$reset(seed + 1)
-      !identical(observation, first$observation) ||
-        any(vapply(seq_along(first$results), differ, NA))
-    }),
-    error = function(cnd) TRUE
-  )
-  if (moved) {
-    note_finding(check, "copies", paste0(
-      "Copies of the environment that are played together, as in `rollout()`, move each other. ",
-      shared_text(check$definition)
-    ))
-  }
-}
-
-# The objects that copies share, as far as the functions show.
-shared_text <- function(definition) {
-  used <- unique(unlist(lapply(definition[c("reset", "step")], function(f) all.names(body(f)))))
-  place <- environment(definition$step) %||% globalenv()
-  shared <- Filter(function(name) is_playable(get0(name, place)), used)
-  if (!length(shared)) {
-    return("Keep the state of an episode in `self`, not outside it.")
-  }
-  id <- get0(shared[[1L]], place)$spec$id
-  paste0("They share the environment `", shared[[1L]], "`: let each make its own, by ",
-         "`if (is.null(self$own)) self$own <- gym_make(\"", id, "\", seed = 1)` in `reset()`.")
 }

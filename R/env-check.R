@@ -3,9 +3,8 @@
 #' Check the spaces, play a few episodes with random actions and check all results, like Gymnasium's
 #' `check_env()`. It finds observations outside their space, rewards that are not finite numbers,
 #' flags that are not `TRUE` or `FALSE`, seeds that do not reproduce an episode, random numbers from
-#' the session's generator, episodes that never end, frames that cannot be drawn, and copies of an
-#' environment in R that move each other because all step the same other environment. If possible,
-#' it continues after a problem.
+#' the session's generator, episodes that never end, and frames that cannot be drawn. If possible, it
+#' continues after a problem.
 #'
 #' It plays two episodes, with the seeds `seed` and `seed + 1`. It then repeats the first one with
 #' the same actions, which must give the same results, bit for bit. All sub-environments of a vector
@@ -13,7 +12,7 @@
 #'
 #' If an environment made by `gym_env(model = )` has no other problem, its model is compared with
 #' some 1000 further steps. The starting states, next states, rewards and ends must be possible by
-#' the model, and transitions that are likely by the model must occur.
+#' the model.
 #'
 #' @param env The environment: made by [gym_env()], [gym_make()] or a class that inherits from
 #'   [GymEnv]; any list or environment with functions `reset(seed)` and `step(action)`; or an id
@@ -28,7 +27,7 @@
 #'   each finding, without rows if there are none, and the columns
 #'   \describe{
 #'     \item{topic}{The topic, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`, `"end"`,
-#'       `"render"`, `"copies"` or `"model"`.}
+#'       `"render"` or `"model"`.}
 #'     \item{severity}{`"wrong"` for a mistake, `"note"` for something that may be intended.}
 #'     \item{finding}{The finding, a sentence.}
 #'   }
@@ -52,7 +51,6 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   match_whole_names()
   check_count(max_steps)
   check_seed(seed, min = 0)
-  id <- env
   if (is_given_by_id(env)) {
     check_environment(env)
     env <- gym_make(env, ..., seed = seed, client = client)
@@ -68,8 +66,6 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   )
   if (check$in_r) {
     check$env <- without_checks(env)
-    check$definition <- definition_of(env)
-    check$copy <- copier_of(env, id, list(...))
     # Reset it before it is played again.
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
@@ -79,18 +75,6 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
     look_at_model(env, check, seed + 1)
   })
   new_check(check)
-}
-
-# A function that makes another sub-environment in the way a rollout does; `NULL` for an object of a
-# class, which exists only once.
-copier_of <- function(env, id, arguments) {
-  definition <- definition_of(env)
-  if (!is.null(definition)) {
-    num_envs <- sub_env_of(env)$num_envs
-    function() definition_sub_env(definition, num_envs)
-  } else if (is_registered(id)) {
-    function() sub_env_of(make_registered(id, arguments))
-  }
 }
 
 new_check <- function(check) {

@@ -1,5 +1,5 @@
 # Values that several sub-environments would share: R copies no environment, and so no object of R6.
-# What functions enclose is not looked at; check_env() finds state outside of `self` by playing.
+# What functions enclose is not looked at.
 
 #' Refuse values that all sub-environments would share
 #'

@@ -4,9 +4,6 @@
 most_compared <- 1000L
 most_compared_in_episode <- 100L
 
-# A transition of the model that play never shows is a mistake if this is less likely by chance.
-too_rare <- 1e-9
-
 #' @exportS3Method
 look_at_model.gym_r_env <- function(env, check, seed) {
   if (is.null(definition_of(env)$model) || is_wrong(check)) {
@@ -76,20 +73,11 @@ steps_by_model <- function(check, model, possible, state, seed) {
 
 compare_starts <- function(check, model, starts) {
   states <- state_numbers(model$observation_space)
-  seen <- states %in% starts
-  unknown <- states[seen & model$start == 0]
-  unseen <- which(!seen & (1 - model$start)^length(starts) < too_rare)
+  unknown <- states[states %in% starts & model$start == 0]
   if (length(unknown)) {
     note_finding(check, "model", paste0(
       "An episode started in state ", unknown[[1L]], " in play, which has the ",
       "probability 0 in the model."
-    ))
-  } else if (length(unseen)) {
-    state <- unseen[[1L]]
-    note_finding(check, "model", paste0(
-      "No episode started in state ", states[[state]], " in ",
-      count_of(length(starts), "episode"), " of play; its probability in the model is ",
-      number_text(model$start[[state]]), "."
     ))
   }
 }
@@ -98,7 +86,7 @@ compare_steps <- function(check, model, steps) {
   table <- model$transitions[model$transitions$probability > 0, ]
   one <- first_unlike(steps, table)
   if (is.null(one)) {
-    return(look_for_unseen(check, steps, table))
+    return(invisible())
   }
   led <- paste0("Action ", one$action, " led from state ", one$state, " to state ",
                 one$next_state, " in play")
@@ -142,27 +130,4 @@ step_keys <- function(steps) {
     next_state = next_state, terminated = terminated,
     reward = paste(terminated, signif(steps$reward, 7L))
   )
-}
-
-look_for_unseen <- function(check, steps, table) {
-  known <- step_keys(table)
-  played <- step_keys(steps)
-  probability <- stats::ave(table$probability, known$reward, FUN = sum)
-  pair <- paste(table$state, table$action)
-  tries <- tabulate(match(paste(steps$state, steps$action), pair), nrow(table))[match(pair, pair)]
-  unseen <- which(!known$reward %in% played$reward & (1 - probability)^tries < too_rare)
-  if (length(unseen)) {
-    row <- unseen[[1L]]
-    one <- table[row, ]
-    there <- known$next_state[[row]] %in% played$next_state
-    note_finding(check, "model", paste0(
-      "Action ", one$action, " was taken ", count_of(tries[[row]], "time"), " in state ",
-      one$state, " and never led to state ", one$next_state,
-      if (there) {
-        paste0(" for the reward ", number_text(one$reward), if (one$terminated) " and the end")
-      },
-      " in play; the probability in the model is ",
-      number_text(probability[[row]]), "."
-    ))
-  }
 }
