@@ -98,7 +98,6 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "unread": python("unread", 4050, 20 if quick else 60),
         "bodies": python("bodies", 2 if quick else 10),
         "memory": python("guests", "memory", 2 if quick else 20),
-        "loops": python("guests", "loops", 1 if quick else 4),
         "processes": python("guests", "processes", 1 if quick else 5),
         "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/processes/test_worker_process.py"),

@@ -2,10 +2,9 @@
 
     tools/in-env python tools/soak/guests.py PART [ROUNDS]
 
-PART is "memory" (nested wrappers, a map with a million fields), "loops" (repeats and numbers that
-make endless steps) or "processes" (creations of 64 processes each). Another client plays before,
-meanwhile and afterwards, and the server's usage is printed each time. Each load ends after its
-rounds, or after a minute.
+PART is "memory" (nested wrappers, a map with a million fields) or "processes" (creations of 64
+processes each). Another client plays before, meanwhile and afterwards, and the server's usage is
+printed each time. Each load ends after its rounds, or after a minute.
 """
 
 from __future__ import annotations
@@ -27,8 +26,6 @@ MOST_MB = 4096
 STACKS = [
     {"name": "FrameStackObservation", "kwargs": {"stack_size": size}} for size in (1000, 1000, 40)
 ]
-REPEATS = [{"name": "RepeatAction", "kwargs": {"num_repeats": 10**15}}]
-ENDLESS = {"max_episode_steps": 10**15}
 
 
 class Player:
@@ -76,24 +73,6 @@ def memory(port: int, granted: list[str]) -> None:
     client.close()
 
 
-def loops(port: int, granted: list[str]) -> None:
-    """Request endless steps."""
-    client = Client(port)
-    fields = {"env_id": "CartPole-v1", "kwargs": ENDLESS, "wrappers": REPEATS}
-    created = ask(client, granted, "/v1/envs/", **fields)
-    if created is not None:
-        ask(client, granted, f"/v1/envs/{created['instance_id']}/reset/")
-        ask(client, granted, f"/v1/envs/{created['instance_id']}/step/", action=1)
-    # Acrobot turns this angle back one round at a time.
-    url = f"/v1/envs/{client.post('/v1/envs/', env_id='Acrobot-v1')['instance_id']}"
-    if ask(client, granted, f"{url}/reset/", options={"low": 1e17, "high": 1.1e17}):
-        ask(client, granted, f"{url}/step/", action=0)
-    # An abandoned creation is interrupted.
-    spinning = {"env_id": "faulty_envs:Spins-v0", "kwargs": {"where": "init"}}
-    ask(client, granted, "/v1/envs/", **spinning)
-    client.close()
-
-
 def processes(port: int, granted: list[str]) -> None:
     """Request many processes, and keep them."""
     client = Client(port)
@@ -102,14 +81,12 @@ def processes(port: int, granted: list[str]) -> None:
     client.close()
 
 
-PARTS = {"memory": memory, "loops": loops, "processes": processes}
+PARTS = {"memory": memory, "processes": processes}
 
 
 def main(name: str, rounds: int) -> int:
     """Run a part; return the exit status."""
-    # Loops are abandoned within the minute, in the server's own process.
-    loops = ("--max-call-seconds", "10") if name == "loops" else ()
-    server = ServerProcess("--log-level", "error", *loops)
+    server = ServerProcess("--log-level", "error")
     player = Player(server.port)
     player.play(1)
     held, took = {}, {}

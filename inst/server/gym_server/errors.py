@@ -132,17 +132,11 @@ def rollout_memory_closed(megabytes: float) -> GymServerError:
     )
 
 
-def call_too_long(what: str, seconds: float, consequence: str) -> GymServerError:
-    """Report a call that took longer than the server allows.
-
-    Args:
-        what: the call, as the subject of a sentence.
-        seconds: the limit.
-        consequence: what the server did about it, as the end of the sentence.
-    """
+def call_too_long(seconds: float) -> GymServerError:
+    """Report a call in an environment's process that took longer than the server allows."""
     return GymServerError(
         "call_too_long",
-        f"{what} took more than {seconds:g} seconds, so {consequence}",
+        f"A call took more than {seconds:g} seconds, so the environment's process was ended",
         "create another; the server's option --max-call-seconds sets the limit",
     )
 

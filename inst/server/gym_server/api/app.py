@@ -61,14 +61,7 @@ class Config:
 
 
 class GymApp(Flask):
-    """The application, which must be closed at the end.
-
-    Attributes:
-        answer_for: sends a response to the client of a thread that is stuck in an environment; set
-            by the owner of the connections.
-    """
-
-    answer_for: Callable[[int, Response], None]
+    """The application, which must be closed at the end."""
 
     def __init__(self, config: Config) -> None:
         """Create the services and the routes."""
@@ -100,8 +93,7 @@ class GymApp(Flask):
             for route in ROUTES
         }
         self.register_error_handler(Exception, lambda error: _for_flask(failure(error)))
-        self.answer_for = lambda thread, response: None
-        self._watchdog = Watchdog(self._instances, self._rollouts, config.limits, self._abandon)
+        self._watchdog = Watchdog(self._instances, self._rollouts, config.limits)
 
     def respond(self, environ: dict) -> Response:
         """Answer a request, given as a WSGI environ."""
@@ -144,11 +136,6 @@ class GymApp(Flask):
         """
         refusals = {413: body_too_large, 503: busy_receiving}
         return failure(refusals[status]() if status in refusals else malformed_request(reason))
-
-    def _abandon(self, thread: int, why: GymServerError) -> None:
-        """Abandon and answer the call of a thread that is stuck in an environment."""
-        response = self._exactly_once.abandon(thread, lambda request_id: failure(why, request_id))
-        self.answer_for(thread, response or failure(why))
 
     def begin_stop(self) -> None:
         """Answer clients that would otherwise wait for longer than the stop may take."""

@@ -29,7 +29,6 @@ from typing import NamedTuple
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import RequestId
 from gym_server.response import Response
-from gym_server.threads.in_progress import InProgress
 
 # Above the limit of bytes, responses are dropped down to this share of it.
 _SHARE_LEFT = 7 / 8
@@ -115,8 +114,6 @@ class ExactlyOnce:
         self._table: dict[str | None, dict[Hashable, _Row]] = {}
         self._bytes = 0
         self._rows_since_sweep = 0
-        # The requests in progress by row: the thread, and what is stored with the response.
-        self._doing: InProgress[_Row, tuple[int, RequestId, Hashable, int]] = InProgress()
 
     def respond(
         self,
@@ -141,7 +138,6 @@ class ExactlyOnce:
                 smaller than the newest, or its response was dropped; ``too_many_keys``.
         """
         row = self._acquire(request_id, instance_id)
-        self._doing[row] = threading.get_ident(), request_id, content, size
         outcome = None
         try:
             if request_id.number <= row.number:
@@ -149,36 +145,13 @@ class ExactlyOnce:
             outcome = act()
             return outcome.response
         finally:
-            if self._doing.finish(row):
-                if outcome is not None and outcome.did_something:
-                    row.instance_id = outcome.instance_id
-                    self._store(row, request_id, content, size, outcome.response)
-                elif row.number < 0:
-                    with self._lock:
-                        self._drop(row)
-                row.lock.release()
-
-    def abandon(self, thread: int, refuse: Callable[[RequestId], Response]) -> Response | None:
-        """Answer for a thread that is stuck; if it returns, its own response is dropped.
-
-        The thread may return at this very moment. ``InProgress`` decides which thread stores the
-        response and releases the lock.
-
-        Args:
-            thread: the thread.
-            refuse: makes the response, also for repetitions.
-
-        Returns:
-            The response; None if the thread is not doing a request with an idempotency key.
-        """
-        for row, (worker, request_id, content, size) in list(self._doing.items()):
-            if worker == thread and self._doing.abandon(row):
-                response = refuse(request_id)
-                self._store(row, request_id, content, size, response)
-                row.lock.release()
-                self._doing.answered(row)
-                return response
-        return None
+            if outcome is not None and outcome.did_something:
+                row.instance_id = outcome.instance_id
+                self._store(row, request_id, content, size, outcome.response)
+            elif row.number < 0:
+                with self._lock:
+                    self._drop(row)
+            row.lock.release()
 
     def _acquire(self, request_id: RequestId, instance_id: str | None) -> _Row:
         """Return the row of a key, and take its lock."""

@@ -101,7 +101,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     budget = Budget(_LARGEST_BODIES * Config.max_body_bytes)
     server = Server(app, listener, Config.max_body_bytes, budget)
     stop.server = server
-    app.answer_for = server.answer_for
     _begin(options, server.port, stop)
     _serve(app, server)
     return 0

@@ -88,7 +88,8 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
     add(
         "max_call_seconds",
         _duration,
-        "how long a call may take before its environment is evicted; 0 for no limit (%(default)g)",
+        "how long a call may take before its process ends, which can be the server; 0 for no limit "
+        "(%(default)g)",
         "SECONDS",
     )
     add(

@@ -1,32 +1,59 @@
-"""End a server in which no Python code runs any more.
+"""End a server in which a call hangs: nothing else can end a thread that is in an environment.
 
-A call that hangs in Python leaves the other threads their turn, and the watchdog answers for it. C
-code that holds Python's lock stops all threads. Only a thread of C, such as faulthandler's, can
-end the process then.
+A call that hangs in Python leaves the other threads their turn, so a thread finds it. C code that
+holds Python's lock stops all threads; then faulthandler's thread, which is one of C, ends the
+process.
 """
 
 from __future__ import annotations
 
 import faulthandler
+import logging
+import os
 import threading
 import time
+
+from gym_server.processes import start
+from gym_server.threads import calls
+
+log = logging.getLogger(__name__)
 
 _LONGEST_BEAT = 1.0
 _SHARE_OF_LIMIT = 0.1
 
 
 def end_when_stuck(seconds: float) -> None:
-    """End the process, with the stacks of all threads in the log, when it is stuck for this long.
+    """End the process, with the stacks of all threads in the log, when a call hangs for this long.
 
     Args:
         seconds: how long; 0 for no limit.
     """
 
-    def beat() -> None:
+    def watch() -> None:
         while True:
-            # Each call puts off the end that the one before has set.
-            faulthandler.dump_traceback_later(seconds, exit=True)
+            try:
+                _beat(seconds)
+            except Exception:
+                # Such as no memory for faulthandler's thread, which may come back.
+                log.exception("A bug in the server")
             time.sleep(min(_LONGEST_BEAT, _SHARE_OF_LIMIT * seconds))
 
     if seconds:
-        threading.Thread(target=beat, name="heartbeat", daemon=True).start()
+        threading.Thread(target=watch, name="heartbeat", daemon=True).start()
+
+
+def _beat(seconds: float) -> None:
+    hanging = calls.overdue(seconds)
+    if hanging is None:
+        # Each time this puts off the end that it has set before.
+        faulthandler.dump_traceback_later(seconds, exit=True)
+        return
+    log.critical(
+        "%s took more than %g seconds, so the server ends; its option --max-call-seconds sets "
+        "the limit",
+        hanging,
+        seconds,
+    )
+    faulthandler.dump_traceback()
+    start.remove_temporary_folder()
+    os._exit(1)

@@ -47,6 +47,10 @@ class EnvConfig:
     autoreset_mode: AutoresetMode | None = None
     name: str | None = None
 
+    def __str__(self) -> str:
+        """Return the environment's id, with its name if it has one."""
+        return f"{self.env_id}" if self.name is None else f"{self.env_id} (name {self.name!r})"
+
     @property
     def wants_workers(self) -> bool:
         """Whether the client asked for worker processes."""

@@ -14,8 +14,6 @@ Why it exists:
       Flask, one route    139 (7,200)          246 (4,100)
       ==================  ===================  =====================
 
-- ``Server.answer_for()`` can answer for a thread that is stuck in the application. The client gets
-  a response, and its connection closes.
 - A stop loses no response: ``Server.run()`` answers all requests that have arrived before it
   returns.
 - Clients that do not read, that send byte by byte, or that open thousands of connections do not

@@ -8,7 +8,6 @@ import io
 import os
 import socket
 import struct
-import threading
 import time
 from functools import lru_cache
 from http import HTTPStatus
@@ -34,9 +33,6 @@ _UNRECOGNIZED_SECONDS = 20.0
 
 # When a response has been unread for this long, the client is slow and not the network.
 _UNREAD_SECONDS = 1.0
-
-# The longest time to send the response of a stuck thread, in seconds.
-_STUCK_ANSWER_SECONDS = 1.0
 
 # The header of responses that need not be delivered after the server has stopped.
 _NO_STORE = ("Cache-Control", "no-store")
@@ -118,10 +114,6 @@ class Connection:
         self._sending: list[int] = []
         # Whether the response being sent need not be delivered after a stop.
         self._sends_no_store = False
-        # The request that waits for its response, as the only item of a list; see answer_for().
-        self._unanswered: list[Request] = []
-        # The identity of the serving thread.
-        self.thread = 0
         # Since when it has been waiting for its client, in the clock's seconds.
         self.waiting_since = time.monotonic()
 
@@ -140,7 +132,6 @@ class Connection:
 
     def serve(self) -> None:
         """Answer requests until the client leaves, is silent for too long, or the server stops."""
-        self.thread = threading.get_ident()
         # A client that has left needs no response, so socket errors are ignored.
         with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -193,15 +184,9 @@ class Connection:
 
     def _answer(self, request: Request) -> bool:
         """Answer one request; return whether another may follow."""
-        self._unanswered.append(request)
         response = self._respond(request)
         if request.held_bytes:
             self._parser.release(request)
-        try:
-            self._unanswered.pop()
-        except IndexError:
-            # answer_for() has answered, because it took too long.
-            return False
         keep = request.keep_alive and self._is_recognized and not self._stopping
         # The connection may be one that a proxy shares among clients with servers of their own.
         keep = keep and response.status != HTTPStatus.UNAUTHORIZED
@@ -241,29 +226,6 @@ class Connection:
                 part = part[sent:]
                 self.waiting_since = time.monotonic()
         self._wait_at_most(_REST_SECONDS)
-
-    def answer_for(self, response: Response) -> None:
-        """Answer for the serving thread, which is stuck in the application; then close.
-
-        Both threads may try to answer the same request:
-
-        1. The serving thread puts the request into ``_unanswered`` and calls the application.
-        2. Another thread decides that this takes too long, and calls ``answer_for()``.
-        3. The application may return at this moment. Both threads then try to take the request
-           out of the list, and only one of them succeeds.
-        4. The thread that took it sends its response. If that is the serving thread,
-           ``answer_for()`` does nothing. Otherwise ``answer_for()`` closes the socket, and the
-           serving thread ends when it returns from the application and finds the list empty.
-        """
-        try:
-            request = self._unanswered.pop()
-        except IndexError:
-            return
-        with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
-            self._socket.settimeout(_STUCK_ANSWER_SECONDS)
-            body = b"" if request.method == "HEAD" else response.body
-            self._socket.sendall(_head(response, keep=False) + body)
-            self._socket.shutdown(socket.SHUT_WR)
 
     def _respond(self, request: Request) -> Response:
         if request.refusal is not None:

@@ -65,11 +65,6 @@ class Connections:
             self._uncount(connection)
             self._changed.notify()
 
-    def served_by(self, thread: int) -> list[Connection]:
-        """Return the connections that this thread serves."""
-        with self._changed:
-            return [one for one in self._all if one.thread == thread]
-
     def make_room(self) -> None:
         """Evict some connections, and wait briefly for them to end."""
         with self._changed:

@@ -17,7 +17,6 @@ from gym_server.http_server import connections
 from gym_server.http_server.connection import Connection
 from gym_server.http_server.connections import Connections
 from gym_server.http_server.interface import Application
-from gym_server.response import Response
 
 log = logging.getLogger(__name__)
 
@@ -126,12 +125,6 @@ class Server:
         self._waker.close()
         self._app.begin_stop()
         return self._connections.drain(grace, _HALF_SENT_SECONDS)
-
-    def answer_for(self, thread: int, response: Response) -> None:
-        """Answer for a thread that is stuck in the application."""
-        for connection in self._connections.served_by(thread):
-            connection.answer_for(response)
-            self._connections.remove(connection)
 
     def _accept(self) -> None:
         if len(self._connections) >= connections.MOST_CONNECTIONS:

@@ -11,7 +11,6 @@ from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import model_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import GymServerError
 from gym_server.instances.local import LocalInstance
 from gym_server.instances.single import SingleInstance
 from gym_server.instances.vector import VectorInstance
@@ -44,7 +43,7 @@ def make_instance(
     with logs.hearing() as warnings:
         if config.num_envs is None:
             env = make.make_env(config, allowed_modules, reservation)
-            undo.push(_closing_quietly(partial(renderer.close, env.close, drawn=False)))
+            undo.callback(_quietly, partial(renderer.close, env.close, drawn=False))
             reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
             wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
             instance: LocalInstance = SingleInstance(wrapped, config, renderer)
@@ -52,19 +51,13 @@ def make_instance(
             sub_envs, mode = make_vector_env(
                 config, allowed_modules, max_num_envs, renderer, reservation
             )
-            undo.push(_closing_quietly(sub_envs.close))
+            undo.callback(_quietly, sub_envs.close)
             instance = VectorInstance(sub_envs, mode, config, renderer)
     instance.warnings = warnings
     return instance
 
 
-def _closing_quietly(close: Callable[[], object]) -> Callable[..., None]:
-    def close_it(kind: type | None, error: BaseException | None, *_: object) -> None:
-        # If the render thread hangs in the environment, leave it alone.
-        if isinstance(error, GymServerError) and error.code == "call_too_long":
-            return
-        # The client gets the original error, not one from closing.
-        with contextlib.suppress(BaseException):
-            close()
-
-    return close_it
+def _quietly(close: Callable[[], object]) -> None:
+    # The client gets the original error, not one from closing.
+    with contextlib.suppress(BaseException):
+        close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -58,7 +57,8 @@ class Instance(Watchable):
         self.config = config
         self.renderer = renderer
         self.lock = InstanceLock(
-            lambda: unknown_instance(self.instance_id), self._close_abandoned, renderer.began
+            lambda: unknown_instance(self.instance_id),
+            lambda call: f"{call}() of instance {self.instance_id} of {self.config}",
         )
         self.viewer = Viewer(self)
         self.steps = 0
@@ -100,6 +100,7 @@ class Instance(Watchable):
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
+            self.lock.call = "reset"
             return self._reset(seed, options, form, mask)
 
     def step(
@@ -136,11 +137,13 @@ class Instance(Watchable):
         if in_real_time or self._in_real_time:
             self.viewer.pace()
         with self.lock:
+            self.lock.call = "step"
             return self._step(action, form, mask)
 
     def sample_action(self) -> object:
         """Sample an action, for each sub-environment, with the action space's generator."""
         with self.lock:
+            self.lock.call = "sample_action"
             return self._sample_action()
 
     # Looks ----------------------------------------------------------------------------------
@@ -153,6 +156,7 @@ class Instance(Watchable):
         """
         self.check_sub_env(sub_env)
         with self.lock:
+            self.lock.call = "render"
             return self._render(sub_env)
 
     def check_sub_env(self, sub_env: int) -> None:
@@ -179,6 +183,7 @@ class Instance(Watchable):
                 "create it without num_envs",
             )
         with self.lock:
+            self.lock.call = "transition_model"
             return self._transition_model()
 
     # At any time ----------------------------------------------------------------------------
@@ -242,6 +247,7 @@ class Instance(Watchable):
                 "create it without num_envs",
             )
         with self.lock:
+            self.lock.call = "start_monitor"
             self._record(root.resolve(directory), directory, force, resume, video_every)
 
     def _record(
@@ -265,6 +271,7 @@ class Instance(Watchable):
             GymServerError: ``monitor_directory`` if something could not be written.
         """
         with self.lock:
+            self.lock.call = "close_monitor"
             self._close_monitor()
 
     # Beginning and end ----------------------------------------------------------------------
@@ -285,40 +292,11 @@ class Instance(Watchable):
     def close(self) -> None:
         """Finish the monitor and close the environment; waiting calls get an error."""
         with self.lock:
+            self.lock.call = "close"
             why = self.lock.refusal()
             self.lock.closed = True
             self.viewer.end(why)
             self._close(why)
-
-    def abandon(self, why: GymServerError) -> int | None:
-        """Close the instance without waiting for its lock: a call on it has taken too long.
-
-        Args:
-            why: the error for every call that waits for the instance.
-
-        Returns:
-            The thread that is stuck in the environment and cannot answer its client, or None.
-        """
-        stuck = self.lock.abandon(why)
-        self.viewer.end(why)
-        self.kill(why)
-        if stuck is None:
-            # The call has just returned.
-            threading.Thread(target=self._close_abandoned_when_free, daemon=True).start()
-            return None
-        return None if self.renderer.abandon(stuck, why) else stuck
-
-    def kill(self, why: GymServerError) -> None:
-        """Kill the environment's own processes, if any.
-
-        Args:
-            why: the error for the calls that this ends.
-        """
-        raise NotImplementedError
-
-    def _close_abandoned_when_free(self) -> None:
-        with self.lock.when_free():
-            self._close_abandoned()
 
     # What differs ---------------------------------------------------------------------------
 
@@ -352,10 +330,6 @@ class Instance(Watchable):
 
     def _close(self, why: GymServerError) -> None:
         """Finish the monitor and close the environment; later calls raise the reason."""
-        raise NotImplementedError
-
-    def _close_abandoned(self) -> None:
-        """Close an abandoned environment, once the call that took too long has returned."""
         raise NotImplementedError
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -255,13 +254,6 @@ class LocalInstance(Instance):
 
     def _close_env(self) -> None:
         raise NotImplementedError
-
-    def _close_abandoned(self) -> None:
-        with contextlib.suppress(BaseException):
-            self._close_monitor()
-        with contextlib.suppress(BaseException):
-            # It may hang again; the watchdog watches the render thread.
-            self.renderer.run(self._close_env)
 
 
 def env_id_of(config: EnvConfig, gym_env: Any) -> str:

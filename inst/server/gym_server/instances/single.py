@@ -135,6 +135,3 @@ class SingleInstance(LocalInstance):
 
     def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Do nothing: this process does not end by itself."""
-
-    def kill(self, why: GymServerError) -> None:
-        """Do nothing: it runs in this process."""

@@ -263,10 +263,6 @@ class VectorInstance(LocalInstance):
     def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         self.gym_env.report_end(on_end)
 
-    def kill(self, why: GymServerError) -> None:
-        """Kill the processes that the sub-environments run in, if any."""
-        self.gym_env.kill(why)
-
 
 def _has_empty_part(space: Space) -> bool:
     """Return whether a space is an empty Tuple or Dict, or contains one."""

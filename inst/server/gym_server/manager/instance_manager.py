@@ -8,7 +8,7 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gym_server.budget import Budget
@@ -17,30 +17,31 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import (
     GymServerError,
-    call_too_long,
     idle_closed,
     memory_closed,
     rollout_memory_closed,
     shutting_down,
+    unknown_instance,
 )
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.manager.account import Account
 from gym_server.manager.limits import Limits, Room
 from gym_server.manager.rollouts import Rollouts
-from gym_server.manager.tombstones import Tombstones
 from gym_server.processes import memory
 from gym_server.processes.pool import pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.rollouts.task import Task
-from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt
+from gym_server.threads import calls
 from gym_server.vector_envs import make_vec
 from gym_server.vector_envs.num_workers import most_workers
 
 log = logging.getLogger(__name__)
 
 _MB = 2**20
+
+# So many reasons why instances were closed are kept.
+_MOST_REASONS = 1000
 
 
 @dataclass
@@ -58,17 +59,10 @@ class _Creation:
     Attributes:
         config: what its client chose.
         taken: its share of the server's limits.
-        began: when it started, in the clock's seconds.
     """
 
     config: EnvConfig
     taken: _Taken
-    began: float = field(default_factory=time.monotonic)
-
-    def too_long(self, seconds: float) -> GymServerError:
-        return call_too_long(
-            f"Making {self.config.env_id}", seconds, "the server stopped waiting for it"
-        )
 
 
 class InstanceManager:
@@ -104,10 +98,8 @@ class InstanceManager:
         self._evicting = threading.Event()
         # By creation until it ends, then by instance_id until the instance is closed.
         self._taken: dict[_Creation | str, _Taken] = {}
-        # The creations with their threads; the instances that are being closed.
-        self._creating: InProgress[_Creation, int] = InProgress()
-        self._closing: dict[str, Instance] = {}
-        self._tombstones = Tombstones()
+        # Why the server closed the last instances that it closed itself, by instance_id.
+        self._reasons: dict[str, GymServerError] = {}
         self._stopping = False
 
     def create(self, config: EnvConfig) -> Instance:
@@ -116,34 +108,33 @@ class InstanceManager:
         Raises:
             GymServerError: see ``factory.make_instance()``; ``invalid_kwargs``, ``shutting_down``,
                 ``environment_died``, ``too_many_instances``, ``too_many_sub_envs``,
-                ``too_many_processes``, ``too_much_memory``; ``call_too_long``.
+                ``too_many_processes``, ``too_much_memory``.
         """
         # Check these first, before creating anything.
         allowed_paths.check(config, self._may_name_files)
         wrappers.check(config.wrappers)
         if config.num_envs is None:
             make_vec.check_single(config)
-        with self._room_for(config) as creation, contextlib.ExitStack() as undo:
+        with (
+            self._room_for(config) as creation,
+            calls.call(lambda: f"Making {config}"),
+            contextlib.ExitStack() as undo,
+        ):
             instance = self._make(creation, undo)
-            if not self._enlist(instance, creation):
-                undo.close()
-                raise creation.too_long(self._limits.max_call_seconds)
+            self._enlist(instance, creation)
             undo.pop_all()
         instance.report_end(lambda why: self._remove(instance.instance_id, why))
         log.info("Created instance %s of %s", instance.instance_id, instance.env_id)
         return instance
 
-    def _enlist(self, instance: Instance, creation: _Creation) -> bool:
-        """Add an instance to the list; return False if its creation was abandoned meanwhile."""
+    def _enlist(self, instance: Instance, creation: _Creation) -> None:
+        """Add an instance to the list."""
         with self._lock:
             if self._stopping:
                 raise shutting_down()
-            if not self._creating.finish(creation):
-                return False
             instance.instance_id = self._new_id()
             self._instances[instance.instance_id] = instance
             self._taken[instance.instance_id] = self._taken.pop(creation)
-            return True
 
     @contextlib.contextmanager
     def _room_for(self, config: EnvConfig) -> Iterator[_Creation]:
@@ -156,17 +147,10 @@ class InstanceManager:
                 workers = min(workers, max(0, self._limits.max_processes - taken.processes))
             room = Room(config.num_envs or 1, workers)
             creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
-            instances = len(self._instances) + len(self._creating)
-            self._limits.check_room(instances, taken, room)
-            self._creating[creation] = threading.get_ident()
+            self._limits.check_room(len(self._taken), taken, room)
             self._taken[creation] = creation.taken
         try:
             yield creation
-        except BaseException:
-            if not self._creating.finish(creation):
-                self._creating.wait_until_answered(creation)
-                raise creation.too_long(self._limits.max_call_seconds) from None
-            raise
         finally:
             self._release(creation)
 
@@ -219,7 +203,7 @@ class InstanceManager:
         try:
             return self._instances[instance_id]
         except KeyError:
-            raise self._tombstones.why(instance_id) from None
+            raise self._why(instance_id) from None
 
     def lives(self, instance_id: str) -> bool:
         """Return whether an instance exists."""
@@ -234,7 +218,7 @@ class InstanceManager:
         """Close an instance for its owner; it becomes unknown."""
         instance = self._unlist(instance_id)
         if instance is None:
-            raise self._tombstones.why(instance_id)
+            raise self._why(instance_id)
         self._close(instance)
         log.info("Closed instance %s", instance_id)
 
@@ -242,20 +226,24 @@ class InstanceManager:
         """Remove an instance from the list; later calls on it raise the reason."""
         with self._lock:
             instance = self._instances.pop(instance_id, None)
-            if instance is None:
-                return None
-            if why is not None:
+            if instance is not None and why is not None:
                 instance.lock.why = why
-                self._tombstones.add(instance_id, why)
-            # Closing may take too long, too; the watchdog looks here for that.
-            self._closing[instance_id] = instance
+                # A copy: an exception that was raised refers to its stack, and so to the
+                # environment.
+                self._reasons[instance_id] = why.again()
+                while len(self._reasons) > _MOST_REASONS:
+                    del self._reasons[next(iter(self._reasons))]
             return instance
+
+    def _why(self, instance_id: str) -> GymServerError:
+        """Return the error for an instance that is unknown, or was closed by the server."""
+        why = self._reasons.get(instance_id)
+        return unknown_instance(instance_id) if why is None else why.again()
 
     def _close(self, instance: Instance) -> None:
         try:
             instance.close()
         finally:
-            self._closing.pop(instance.instance_id, None)
             self._release(instance.instance_id)
 
     def _close_in_background(
@@ -281,55 +269,9 @@ class InstanceManager:
         """Return the list entries of all instances, oldest first, without waiting for any."""
         return [instance.list_entry() for instance in self._all()]
 
-    def evict_overdue(
-        self, seconds: float, answer_for: Callable[[int, GymServerError], None]
-    ) -> None:
-        """Evict instances on which a call takes too long; the others continue.
-
-        Args:
-            seconds: how long a call may take.
-            answer_for: answers for a thread that is stuck.
-        """
-        before = time.monotonic() - seconds
-
-        def answer(stuck: int, why: GymServerError) -> None:
-            answer_for(stuck, why)
-            # The thread waits for this answer, so it has not moved on to other work.
-            interrupt(stuck)
-
-        for creation, thread in list(self._creating.items()):
-            began = self._renderer.began(thread) or creation.began
-            if began < before and self._creating.abandon(creation):
-                why = creation.too_long(seconds)
-                log.warning("%s", why.message)
-                if not self._renderer.abandon(thread, why):
-                    answer(thread, why)
-                self._creating.answered(creation)
-        with self._lock:
-            instances = [*self._instances.values(), *self._closing.values()]
-        for instance in instances:
-            since = instance.lock.busy_since
-            if since is not None and since < before:
-                what = f"A call on instance {instance.instance_id} of {instance.env_id}"
-                why = call_too_long(what, seconds, "the instance is gone")
-                log.warning("%s", why.message)
-                self._remove(instance.instance_id, why)
-                stuck = instance.abandon(why)
-                if stuck is not None:
-                    answer(stuck, why)
-                instance.lock.answered()
-        # An evicted instance, which is no longer listed, may hang again on the render thread while
-        # it is closed.
-        why = call_too_long("Closing an environment", seconds, "the server stopped waiting for it")
-        if self._renderer.abandon_if_began_before(before - seconds, why):
-            log.warning("%s", why.message)
-
     def _remove(self, instance_id: str, why: GymServerError) -> None:
-        """Remove an instance without closing it; keep the reason."""
+        """Remove an instance whose process has ended; keep the reason."""
         self._unlist(instance_id, why)
-        # Even if it was being closed, and is no longer listed.
-        self._tombstones.add(instance_id, why)
-        self._closing.pop(instance_id, None)
         self._release(instance_id)
 
     def evict_largest(self, rollouts: Rollouts) -> None:
@@ -371,7 +313,7 @@ class InstanceManager:
         now = time.monotonic()
         for instance in self._all():
             lock = instance.lock
-            if max(lock.used, lock.watched) > now - minutes * 60 or lock.busy_since is not None:
+            if max(lock.used, lock.watched) > now - minutes * 60 or lock.is_held:
                 continue
             if instance.viewer.is_watched:
                 lock.watched = now
@@ -401,5 +343,5 @@ class InstanceManager:
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
-            if instance_id not in self._instances and instance_id not in self._tombstones:
+            if instance_id not in self._instances and instance_id not in self._reasons:
                 return instance_id

@@ -43,7 +43,7 @@ class Limits:
         max_memory_mb: the memory of all environments in MiB, estimated in advance
             (``memory_estimate``) and measured afterwards (``Account``). The default is half the
             memory of a small machine.
-        max_call_seconds: how long a call may take before its instance is evicted; 0 for no limit.
+        max_call_seconds: how long a call may take; 0 for no limit.
             The default is longer than ordinary calls, and short enough that the error is there
             after a coffee break.
         idle_minutes: how long an instance may be unused and unwatched before it is evicted; 0 for

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gym_server.errors import GymServerError, call_too_long, shutting_down
+from gym_server.errors import GymServerError, shutting_down
 from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
@@ -66,16 +66,12 @@ class _Player:
         process: the process; None until it is started.
         request: what it is playing, or None.
         units: the units that it is playing.
-        steps, steps_since: the number of steps of the process when it was last checked, and since
-            when it has that number.
         known: the numbers of the requests whose task the process has, the latest last.
     """
 
     process: WorkerProcess | None = None
     request: RolloutRequest | None = None
     units: range = range(0)
-    steps: int = -1
-    steps_since: float = 0.0
     known: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_KNOWN))
 
 
@@ -211,7 +207,9 @@ class Rollouts:
     def _let_process_go(self, player: _Player) -> None:
         with self._changed:
             process, player.process = player.process, None
-        if process is not None:
+        if process is not None and self._stopping:
+            process.kill()
+        elif process is not None:
             pool.put(process)
 
     def _take_turn(self, player: _Player) -> bool:
@@ -280,8 +278,11 @@ class Rollouts:
             process.report_end(lambda why: None)
             player.known.clear()
         process.progress[1] = 0
-        player.steps, player.steps_since = -1, time.monotonic()
-        player.process = process
+        with self._changed:
+            player.process = process
+            # A process that was being started when end() looked for processes.
+            if self._stopping:
+                raise shutting_down()
         if request.function == "describe":
             process.begin("describe", request.task)
             return 1, process.finish(), None
@@ -306,42 +307,23 @@ class Rollouts:
         request.deaths[at_fault] = request.deaths.get(at_fault, 0) + 1
         was_killed = error.code != "environment_died"
         if was_killed or request.deaths[at_fault] == _MOST_DEATHS:
-            seed = request.units[at_fault].seed
-            message = error.message if was_killed else f"{error.message} (episode of seed {seed})"
+            env_id, seed = request.task.config.env_id, request.units[at_fault].seed
+            message = f"{error.message} (in {env_id}, episode of seed {seed})"
             request.fail(at_fault, GymServerError(error.code, message, error.hint))
         request.give_back(units)
 
     # Limits ---------------------------------------------------------------------------------
 
-    def kill_overdue(self, seconds: float) -> None:
-        """Kill processes that have taken no step for too long, or play unwanted episodes.
-
-        Args:
-            seconds: how long a step may take; 0 for no limit.
-        """
-        now = time.monotonic()
+    def kill_unwanted(self) -> None:
+        """Kill processes that go on playing episodes that nobody waits for."""
+        before = time.monotonic() - _UNWANTED_SECONDS
         with self._changed:
             for player in self._players:
                 request, process = player.request, player.process
-                if request is None or process is None:
+                if request is None or process is None or request.unwanted_since is None:
                     continue
-                steps = process.progress[0]
-                if steps != player.steps:
-                    player.steps, player.steps_since = steps, now
-                since = request.unwanted_since
-                if since is not None and now > since + _UNWANTED_SECONDS:
+                if request.unwanted_since < before:
                     process.kill(shutting_down())
-                elif seconds and now > player.steps_since + seconds:
-                    units = player.units
-                    unit = request.units[units[min(process.progress[1], len(units) - 1)]]
-                    why = call_too_long(
-                        f"A step of {request.task.config.env_id}, in the episode of seed "
-                        f"{unit.seed},",
-                        seconds,
-                        "its process is gone",
-                    )
-                    log.warning("%s", why.message)
-                    process.kill(why)
 
     def pids(self) -> list[int]:
         """Return the numbers of the processes."""

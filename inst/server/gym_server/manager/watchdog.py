@@ -1,7 +1,6 @@
-"""Find calls that take too long and unused instances, and return free memory.
+"""Kill processes that hang, close unused instances, and return free memory.
 
-The watchdog has its own thread, because a thread that is stuck in an environment cannot help
-itself, and so that checking slows no call.
+The watchdog has its own thread, so that checking slows no call.
 """
 
 from __future__ import annotations
@@ -9,13 +8,12 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
 
-from gym_server.errors import GymServerError
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
 from gym_server.processes import memory
+from gym_server.processes.worker_process import kill_overdue
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +37,6 @@ class Watchdog:
         instances: InstanceManager,
         rollouts: Rollouts,
         limits: Limits,
-        answer_for: Callable[[int, GymServerError], None],
     ) -> None:
         """Start to watch.
 
@@ -47,12 +44,10 @@ class Watchdog:
             instances: the instances to watch.
             rollouts: the rollouts to watch.
             limits: the limits.
-            answer_for: answers for a thread that is stuck.
         """
         self._instances = instances
         self._rollouts = rollouts
         self._limits = limits
-        self._answer_for = answer_for
         self._gave_back = self._measured = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
@@ -72,9 +67,9 @@ class Watchdog:
                 log.exception("A bug in the server")
 
     def _check(self) -> None:
-        self._rollouts.kill_overdue(self._limits.max_call_seconds)
         if self._limits.max_call_seconds:
-            self._instances.evict_overdue(self._limits.max_call_seconds, self._answer_for)
+            kill_overdue(self._limits.max_call_seconds)
+        self._rollouts.kill_unwanted()
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
         if time.monotonic() > self._measured + _MEASURE_SECONDS:

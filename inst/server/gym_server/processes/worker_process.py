@@ -10,16 +10,18 @@ import logging
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from multiprocessing import process as multiprocessing_process
 from multiprocessing.connection import wait
 from typing import Any, cast
 
-from gym_server.errors import GymServerError, environment_died, shutting_down
+from gym_server.errors import GymServerError, call_too_long, environment_died, shutting_down
 from gym_server.processes import start
 from gym_server.processes.messages import CallPipe
 from gym_server.processes.pipe import MalformedMessageError
 from gym_server.processes.serve import serve
+from gym_server.threads.calls import waiting
 
 log = logging.getLogger(__name__)
 
@@ -36,6 +38,16 @@ _LOWER_PRIORITY = 5
 _FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
 
 
+# All that have not ended.
+_alive: set[WorkerProcess] = set()
+
+
+def kill_overdue(seconds: float) -> None:
+    """End the processes whose call has made no progress for this many seconds."""
+    for process in list(_alive):
+        process.kill_if_overdue(seconds)
+
+
 class WorkerProcess:
     """A process that runs the functions of one module; of another when it is taken again.
 
@@ -43,7 +55,8 @@ class WorkerProcess:
         module: the name of the module.
         pid: the process number.
         why: the error for every caller once it has ended, else None.
-        progress: two integers that the running function may set.
+        progress: two integers that the running function may set; while it changes the first, it
+            does not hang.
         has_low_priority: whether it runs at a lower priority.
     """
 
@@ -58,14 +71,19 @@ class WorkerProcess:
         self.why: GymServerError | None = None
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._lock = threading.Lock()
-        # Why the server ended it, if it did.
+        # Why the server ended it, if it did: by intention, or because a call hung.
         self._our_reason: GymServerError | None = None
+        self._hung: GymServerError | None = None
         # What was wrong with a message from it.
         self._fault = ""
         self._phase = "while it was created"
         # Until report_end(), the creation that waits for the process gets the error itself.
         self._end_expected = True
         self._ended = threading.Event()
+        # Since when the current call has made no progress, in the clock's seconds; None if no call
+        # is running.
+        self._since: float | None = None
+        self._last_progress = 0
         context = start.context()
         self.progress = context.RawArray("q", 2)
         ours, theirs = context.Pipe()
@@ -80,6 +98,7 @@ class WorkerProcess:
             self._process.start()
             self.pid = cast(int, self._process.pid)
             threading.Thread(target=self._await_end, daemon=True).start()
+            _alive.add(self)
         except BaseException:
             self._send_kill()
             self._calls.close()
@@ -115,17 +134,25 @@ class WorkerProcess:
         """Start a ``call()``; unless this raises an error, ``finish()`` must follow."""
         if self.why is not None:
             raise self.why.again()
+        self._since = time.monotonic()
         try:
-            self._calls.begin(f"{self.module}:{function}", *args)
+            with waiting():
+                self._calls.begin(f"{self.module}:{function}", *args)
         except _FAULTS as fault:
             raise self._end_after(fault) from None
+        except BaseException:
+            self._since = None
+            raise
 
     def finish(self) -> Any:
         """Return the result of the call; see ``call()``."""
         try:
-            return self._calls.finish()
+            with waiting():
+                return self._calls.finish()
         except _FAULTS as fault:
             raise self._end_after(fault) from None
+        finally:
+            self._since = None
 
     def _end_after(self, fault: Exception) -> GymServerError:
         """Make sure that the process has ended; return the reason."""
@@ -185,6 +212,17 @@ class WorkerProcess:
         if not self._ended.wait(_EXIT_SECONDS):
             self._send_kill()
 
+    def kill_if_overdue(self, seconds: float) -> None:
+        """End it if its call has made no progress for this many seconds."""
+        since, progress, now = self._since, self.progress[0], time.monotonic()
+        if since is None:
+            return
+        if progress != self._last_progress:
+            self._last_progress, self._since = progress, now
+        elif now > since + seconds:
+            self._hung = call_too_long(seconds)
+            self._send_kill()
+
     def _send_kill(self) -> None:
         if not self._ended.is_set():
             with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -196,9 +234,10 @@ class WorkerProcess:
         code = self._process.exitcode
         self._kill_group()
         with self._lock:
-            self.why = self._our_reason or self._died(code)
+            self.why = self._our_reason or self._hung or self._died(code)
             was_expected = self._end_expected or self._our_reason is not None
         self._ended.set()
+        _alive.discard(self)
         self._calls.wake()
         self._calls.close()
         self._process.close()

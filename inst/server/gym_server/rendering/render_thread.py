@@ -11,13 +11,11 @@ import contextlib
 import queue
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from typing import TypeVar
 
-from gym_server.threads.in_progress import InProgress
-from gym_server.threads.interrupt import interrupt
+from gym_server.threads import calls
 
 ResultT = TypeVar("ResultT")
 
@@ -34,17 +32,15 @@ class _Job:
     """One piece of work for the render thread.
 
     Attributes:
-        caller: the thread that waits for the result.
         draw: the function to run.
+        describe: describes the call that it belongs to.
         future: its result.
-        began: when it started, in the clock's seconds; None while it waits for its turn.
     """
 
-    def __init__(self, draw: Callable[[], object]) -> None:
-        self.caller = threading.get_ident()
+    def __init__(self, draw: Callable[[], object], describe: Callable[[], str]) -> None:
         self.draw = draw
+        self.describe = describe
         self.future: Future = Future()
-        self.began: float | None = None
 
 
 class RenderThread:
@@ -55,11 +51,7 @@ class RenderThread:
         self._lock = threading.Lock()
         self._queue: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
-        self._running: _Job | None = None
-        self._in_progress: InProgress[_Job, None] = InProgress()
         self._stopped = False
-        # By the thread that waits for the result.
-        self._jobs: dict[int, _Job] = {}
 
     def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
         """Run a function on the render thread; return its result or raise its exception."""
@@ -99,99 +91,25 @@ class RenderThread:
 
     @contextlib.contextmanager
     def _job(self, draw: Callable, *args: object) -> Iterator[_Job]:
-        job = _Job(lambda: _keep_pygame_and(draw, *args))
-        with self._lock:
-            if self._stopped:
-                raise RuntimeError("nothing is drawn any more")
-            if self._thread is None:
-                self._start()
-            self._jobs[job.caller] = job
-            self._queue.put(job)
-        try:
+        with calls.waiting() as describe:
+            job = _Job(lambda: _keep_pygame_and(draw, *args), describe or (lambda: "Drawing"))
+            with self._lock:
+                if self._stopped:
+                    raise RuntimeError("nothing is drawn any more")
+                if self._thread is None:
+                    # A daemon, so that drawing that never ends does not keep the process alive.
+                    self._thread = threading.Thread(target=self._work, name="render", daemon=True)
+                    self._thread.start()
+                self._queue.put(job)
             yield job
-        finally:
-            self._jobs.pop(job.caller, None)
-
-    def _start(self) -> None:
-        # A daemon thread, so that drawing that never ends does not keep the process alive.
-        self._thread = threading.Thread(target=self._work, name="render", daemon=True)
-        self._thread.start()
 
     def _work(self) -> None:
         while (job := self._queue.get()) is not None:
-            self._running = job
-            if not self._do(job):
-                return
+            if job.future.set_running_or_notify_cancel():
+                with calls.call(job.describe):
+                    _do(job)
             # Do not keep the picture until the next job comes.
-            self._running = job = None
-
-    def _do(self, job: _Job) -> bool:
-        """Run a job; return False if another thread has replaced this one meanwhile."""
-        job.began = time.monotonic()
-        if not job.future.set_running_or_notify_cancel():
-            return True
-        self._in_progress[job] = None
-        try:
-            result = job.draw()
-        except BaseException as error:
-            if not self._in_progress.finish(job):
-                return False
-            job.future.set_exception(error)
-        else:
-            if not self._in_progress.finish(job):
-                return False
-            job.future.set_result(result)
-        return True
-
-    def began(self, thread: int) -> float | None:
-        """Return when the job that a thread waits for started, in the clock's seconds.
-
-        None if the thread does not wait for a job, the current time if the job has not started.
-        """
-        job = self._jobs.get(thread)
-        if job is None:
-            return None
-        return time.monotonic() if job.began is None else job.began
-
-    def abandon(self, thread: int, why: Exception) -> bool:
-        """Replace the render thread if it is stuck in a thread's job.
-
-        Args:
-            thread: the thread that waits for the job's result, or the render thread itself.
-            why: the exception to raise in the waiting thread.
-
-        Returns:
-            Whether the render thread was stuck there and was replaced.
-        """
-        with self._lock:
-            job = self._running
-            hanging = self._thread.ident if self._thread else None
-            if job is None or hanging is None or thread not in (job.caller, hanging):
-                return False
-            if not self._in_progress.abandon(job):
-                return False
-            job.future.set_exception(why)
-            self._running = None
-            # Interrupt before waiting: the thread could end, and another get its identity.
-            interrupt(hanging)
-            self._in_progress.answered(job)
-            self._start()
-            return True
-
-    def abandon_if_began_before(self, moment: float, why: Exception) -> bool:
-        """Replace the render thread if its job takes too long.
-
-        Args:
-            moment: the latest allowed start of the job, in the clock's seconds.
-            why: the exception to raise in the thread that waits for the result.
-
-        Returns:
-            Whether the render thread was replaced.
-        """
-        job = self._running
-        if job is None or job.began is None or job.began >= moment:
-            return False
-        return self.abandon(job.caller, why)
+            job = None
 
     def stop(self) -> None:
         """Finish the queued jobs, and end the thread."""
@@ -200,6 +118,15 @@ class RenderThread:
             self._queue.put(None)
         if self._thread is not None:
             self._thread.join()
+
+
+def _do(job: _Job) -> None:
+    try:
+        result = job.draw()
+    except BaseException as error:
+        job.future.set_exception(error)
+    else:
+        job.future.set_result(result)
 
 
 def _keep_pygame_and(draw: Callable[..., ResultT], *args: object) -> ResultT:

@@ -21,13 +21,12 @@ from gymnasium.vector.utils import batch_space
 from gym_server import spaces
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.wrappers import draws_when_stepped
-from gym_server.errors import GymServerError, shutting_down
+from gym_server.errors import GymServerError
 from gym_server.processes.cores import spread
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
-from gym_server.threads.interrupt import interrupted_by
 from gym_server.vector_envs import group_worker
 from gym_server.vector_envs.group import Group, Outcome
 from gym_server.vector_envs.group_calls import AnyGroup, call_all
@@ -106,10 +105,7 @@ class SubEnvs:
             self._groups.append(LocalGroup(group, self.drawing))
         else:
             self._describe_one(sub_env)
-            # Interrupting this thread while it talks to the fork server would break the fork
-            # server, and with it all other processes.
-            with interrupted_by(self.kill):
-                self._start(sub_env, groups)
+            self._start(sub_env, groups)
 
     # Making ---------------------------------------------------------------------------------
 
@@ -139,17 +135,14 @@ class SubEnvs:
         try:
             for _ in groups:
                 self._groups.append(pool.take(group_worker.__name__))
-                # It is now where kill() looks: either kill() or this check finds it.
-                if self._is_closed:
-                    raise shutting_down()
             pickled = _pickled(sub_env)
             call_all(
                 (group, "make", (pickled, numbers, self.autoreset_mode))
                 for group, numbers in zip(self._groups, groups, strict=True)
             )
         except GymServerError as refusal:
-            self.kill()
-            if refusal.code == "environment_died":
+            self._kill_processes()
+            if refusal.code in ("environment_died", "call_too_long"):
                 raise
             # Making one in this process has succeeded.
             raise GymServerError(
@@ -158,7 +151,7 @@ class SubEnvs:
                 "use num_workers 0 to run the sub-environments in the server's process",
             ) from refusal
         except BaseException:
-            self.kill()
+            self._kill_processes()
             raise
         spread(self.pids)
 
@@ -315,7 +308,8 @@ class SubEnvs:
     def _end(self, why: GymServerError) -> None:
         """End when one of the processes has ended."""
         if not self._is_closed:
-            self.kill(why)
+            self._is_closed = True
+            self._kill_processes(why)
             self._on_end(why)
 
     @property
@@ -359,11 +353,6 @@ class SubEnvs:
                 pool.put(group)
         if not self._keeps_processes:
             self._kill_processes()
-
-    def kill(self, why: GymServerError | None = None) -> None:
-        """Kill its processes, which ends calls that hang in them."""
-        self._is_closed = True
-        self._kill_processes(why)
 
     def _kill_processes(self, why: GymServerError | None = None) -> None:
         for group in self._groups:

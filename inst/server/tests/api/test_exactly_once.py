@@ -233,38 +233,6 @@ def test_a_key_that_is_in_use_is_not_forgotten():
     assert act.calls == 0
 
 
-def test_what_never_comes_back_is_answered_by_another_thread():
-    once, act = Once(), Counter()
-    began, may_end = threading.Event(), threading.Event()
-
-    def stuck():
-        began.set()
-        assert may_end.wait(10)
-        return outcome("too late")
-
-    thread = threading.Thread(target=once.answer, args=(RequestId("a", 1), "step", stuck))
-    thread.start()
-    assert began.wait(10)
-    repetition = []
-    waiting = threading.Thread(
-        target=lambda: repetition.append(once.answer(RequestId("a", 1), "step", act))
-    )
-    waiting.start()
-
-    def refuse(request_id):
-        return Response(504, b"", f"abandoned {request_id.number}")
-
-    assert once.abandon(thread.ident, refuse).content_type == "abandoned 1"
-    waiting.join(10)
-    assert repetition == ["abandoned 1"]
-    assert once.answer(RequestId("a", 2), "step", act) == 1
-    may_end.set()
-    thread.join(10)
-    # The late answer is dropped.
-    assert once.answer(RequestId("a", 2), "step", act) == 1
-    assert once.abandon(thread.ident, str) is None
-
-
 def test_what_all_keep_together_is_bounded_and_nothing_is_done_again():
     once = Once(living="ijk", most_bytes=320)
     once.answer(RequestId("first", 1), "", lambda: outcome("first", size=80), "i")

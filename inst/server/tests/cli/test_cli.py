@@ -6,6 +6,7 @@ import time
 
 import pytest
 from conftest import SHORT_GRACE
+from running import descendants, is_running
 
 from gym_server.cli import main
 
@@ -177,12 +178,43 @@ def test_an_option_that_is_gone_names_what_replaces_it(option, instead, capsys):
         assert f"{option} is gone" in said and instead in said
 
 
-@needs_signals
-def test_a_call_that_holds_pythons_lock_for_too_long_ends_the_server(serve):
-    server = serve("--allow-module", "faulty_envs", "--max-call-seconds", "1")
-    url = server.create("faulty_envs:Rogue-v0", kwargs={"does": "never_returns"})
+# The calls before the one that hangs take less, even on a busy machine.
+HANGS = ("--max-call-seconds", "4")
+
+
+def ended(server, url):
+    """Take a step that hangs; return the server's log."""
     server.post(f"{url}/reset/")
     with pytest.raises((OSError, http.client.HTTPException)):
         server.post(f"{url}/step/", {"action": 0})
-    assert server.process.wait(20) == 1
-    assert "never_returns" in server.process.stderr.read()
+    assert server.process.wait(30) == 1
+    return server.process.stderr.read()
+
+
+def test_a_call_that_hangs_ends_the_server_which_says_why(serve, eventually):
+    server = serve(*HANGS)
+    workers = server.create("faulty_envs:Counting-v0", num_envs=2, num_workers=2)
+    children = descendants(server.process.pid)
+    url = server.create("faulty_envs:Hanging-v0", name="mine")
+    log = ended(server, url)
+    assert (
+        f"step() of instance {url.rsplit('/', 1)[1]} of faulty_envs:Hanging-v0 (name 'mine') took "
+        "more than 4 seconds, so the server ends; its option --max-call-seconds sets the limit\n"
+    ) in log
+    assert "hanging.py" in log
+    assert workers and children
+    eventually(lambda: not any(map(is_running, children)))
+
+
+@needs_signals
+def test_a_call_that_holds_pythons_lock_for_too_long_ends_the_server(serve):
+    server = serve(*HANGS)
+    url = server.create("faulty_envs:Rogue-v0", kwargs={"does": "never_returns"})
+    assert "never_returns" in ended(server, url)
+
+
+def test_a_server_without_a_limit_is_not_ended(serve):
+    server = serve("--max-call-seconds", "0")
+    url = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 1.0})
+    server.post(f"{url}/reset/")
+    assert server.post(f"{url}/step/", {"action": 0})[0] == 200

@@ -12,9 +12,7 @@ from faulty_envs.hanging import (
     Gated,
     Hanging,
     HangsWhenClosedElsewhere,
-    HangsWhere,
     Meeting,
-    Spins,
 )
 from faulty_envs.odd_spaces import (
     SPACES,
@@ -55,7 +53,6 @@ for _kind in (
     Gated,
     Hanging,
     HangsWhenClosedElsewhere,
-    HangsWhere,
     Insists,
     KeepsItsArrays,
     KillsItself,
@@ -75,7 +72,6 @@ for _kind in (
     Returning,
     Rogue,
     Shifted,
-    Spins,
     SpoilsOneSubEnv,
     Table,
     Uneven,

@@ -33,9 +33,10 @@ class Meeting(Counting):
 
 
 class Gated(Counting):
-    """Waits until a test lets it continue, in its step or, if its kwarg says so, when drawing.
+    """Waits until a test lets it continue, in the method that its kwarg names.
 
-    It creates a file "begun" in a directory, and waits for a file "open".
+    With "init elsewhere", in the constructor in a process that another one has started. It creates
+    a file "begun" in a directory, and waits for a file "open".
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
@@ -43,6 +44,9 @@ class Gated(Counting):
     def __init__(self, directory, where="step", render_mode=None, **kwargs):
         super().__init__(**kwargs)
         self.directory, self.where, self.render_mode = Path(directory), where, render_mode
+        self.wait("init")
+        if multiprocessing.parent_process() is not None:
+            self.wait("init elsewhere")
 
     def wait(self, here):
         if self.where != here:
@@ -54,6 +58,10 @@ class Gated(Counting):
                 raise RuntimeError("Nobody let it go on")
             time.sleep(0.01)
 
+    def reset(self, *, seed=None, options=None):
+        self.wait("reset")
+        return super().reset(seed=seed, options=options)
+
     def step(self, action):
         self.wait("step")
         return super().step(action)
@@ -62,64 +70,8 @@ class Gated(Counting):
         self.wait("render")
         return np.zeros((2, 2, 3), dtype=np.uint8)
 
-
-class HangsWhere(Counting):
-    """Hangs for some seconds in the method that its kwarg names: init, reset, render or close."""
-
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
-    closed = 0
-
-    def __init__(self, where, hours=1.0, render_mode=None):
-        super().__init__()
-        self.where, self.hours, self.render_mode = where, hours, render_mode
-        self.hang("init")
-
-    def hang(self, here):
-        if self.where == here:
-            time.sleep(3600 * self.hours)
-
-    def reset(self, *, seed=None, options=None):
-        self.hang("reset")
-        return super().reset(seed=seed, options=options)
-
-    def render(self):
-        self.hang("render")
-        return np.zeros((2, 2, 3), dtype=np.uint8)
-
     def close(self):
-        self.hang("close")
-        type(self).closed += 1
-
-
-class Spins(Counting):
-    """Loops forever in the method that its kwarg names: init, step, render or close.
-
-    With "init elsewhere", in the constructor in a process that another one has started.
-    """
-
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
-
-    def __init__(self, where, render_mode=None):
-        super().__init__()
-        self.where, self.render_mode = where, render_mode
-        self.spin("init")
-        if multiprocessing.parent_process() is not None:
-            self.spin("init elsewhere")
-
-    def spin(self, here):
-        while self.where == here:
-            pass
-
-    def step(self, action):
-        self.spin("step")
-        return super().step(action)
-
-    def render(self):
-        self.spin("render")
-        return np.zeros((2, 2, 3), dtype=np.uint8)
-
-    def close(self):
-        self.spin("close")
+        self.wait("close")
 
 
 class HangsWhenClosedElsewhere(Counting):

@@ -45,28 +45,23 @@ def test_there_are_only_so_many_instances(limited):
         assert make(client).status_code == 200
 
 
-def test_many_that_come_at_once_get_no_more(limited):
+def test_many_that_come_at_once_get_no_more(limited, gate, eventually):
     client = limited(max_instances=3)
-    answers = []
-    threads = [
-        threading.Thread(
-            target=lambda: answers.append(
-                client.application.test_client().post(
-                    "/v1/envs/",
-                    json={"env_id": "faulty_envs:HangsWhere-v0", "kwargs": SHORTLY},
-                )
-            )
-        )
-        for _ in range(12)
-    ]
+    fields = {"env_id": "faulty_envs:Gated-v0", "kwargs": {**gate.kwargs, "where": "init"}}
+    statuses = []
+
+    def create():
+        answer = client.application.test_client().post("/v1/envs/", json=fields)
+        statuses.append(answer.status_code)
+
+    threads = [threading.Thread(target=create) for _ in range(12)]
     for thread in threads:
         thread.start()
+    eventually(lambda: statuses == [429] * 9)
+    gate.open()
     for thread in threads:
         thread.join()
-    assert sorted(answer.status_code for answer in answers) == [200] * 3 + [429] * 9
-
-
-SHORTLY = {"where": "init", "hours": 0.3 / 3600}
+    assert statuses[9:] == [200] * 3
 
 
 def test_what_could_not_be_made_takes_no_room(limited):

@@ -76,28 +76,3 @@ def test_a_job_that_has_begun_is_waited_for():
 def test_a_job_that_may_wait_gets_its_turn(occupied):
     renderer, go_on = occupied
     assert renderer.run_while(lambda: go_on() or True, lambda: "drawn") == "drawn"
-
-
-def test_another_thread_draws_on_when_one_hangs():
-    renderer, began, may_end = RenderThread(), threading.Event(), threading.Event()
-    outcomes = []
-
-    def ask():
-        try:
-            renderer.run(lambda: (began.set(), may_end.wait(10), threading.get_ident()))
-        except ValueError as why:
-            outcomes.append(str(why))
-
-    asking = threading.Thread(target=ask)
-    asking.start()
-    assert began.wait(10)
-    assert not renderer.abandon(threading.get_ident(), ValueError("not mine"))
-    assert renderer.abandon(asking.ident, ValueError("it hangs"))
-    asking.join(10)
-    assert outcomes == ["it hangs"]
-    first = renderer.run(threading.get_ident)
-    # The thread that returns draws no more.
-    may_end.set()
-    assert {renderer.run(threading.get_ident) for _ in range(20)} == {first}
-    assert not renderer.abandon(first, ValueError("it does not hang"))
-    renderer.stop()

@@ -1,24 +1,17 @@
 """The lock of an instance."""
 
 import threading
-import time
 
 import pytest
 
 from gym_server.errors import GymServerError, unknown_instance
-from gym_server.rendering.render_thread import RenderThread
+from gym_server.threads import calls
 from gym_server.threads.lock import InstanceLock
 
 
 @pytest.fixture
-def cleared():
-    """Return what the lock has closed so far."""
-    return []
-
-
-@pytest.fixture
-def lock(cleared):
-    return InstanceLock(lambda: unknown_instance("12345678"), lambda: cleared.append(True))
+def lock():
+    return InstanceLock(lambda: unknown_instance("12345678"), lambda call: f"{call}() of it")
 
 
 def test_one_has_it_at_a_time(lock):
@@ -54,76 +47,13 @@ def refused(call, *args):
         call(*args)
 
 
-def test_it_tells_since_when_it_is_taken(lock):
-    assert lock.busy_since is None
-    before = time.monotonic()
+def test_it_tells_what_it_is_held_for(lock):
     with lock:
-        assert before <= lock.busy_since <= time.monotonic()
-    assert lock.busy_since is None
+        lock.call = "step"
+        assert calls.overdue(-1) == "step() of it"
+        assert lock.is_held
     assert lock.acquire(0)
-    assert lock.busy_since is not None
+    assert calls.overdue(-1) == "render() of it"
     lock.release()
-    assert lock.busy_since is None
-
-
-def test_who_waits_for_the_render_thread_has_not_begun(eventually):
-    renderer = RenderThread()
-    lock = InstanceLock(lambda: unknown_instance("12345678"), lambda: None, renderer.began)
-    occupied, may_end = threading.Event(), threading.Event()
-
-    def occupy():
-        occupied.set()
-        may_end.wait(10)
-
-    occupying = threading.Thread(target=renderer.run, args=(occupy,))
-    occupying.start()
-    assert occupied.wait(10)
-
-    def draw():
-        with lock:
-            renderer.run(lambda: None)
-
-    drawing = threading.Thread(target=draw)
-    drawing.start()
-    eventually(lambda: lock.busy_since is not None)
-    since = lock.busy_since
-    eventually(lambda: lock.busy_since > since)
-    may_end.set()
-    drawing.join(10)
-    occupying.join(10)
-    assert lock.busy_since is None
-    renderer.stop()
-
-
-def test_it_can_be_taken_away_from_a_thread_that_is_stuck(lock, cleared):
-    why = GymServerError("call_too_long", "too long")
-    entered, may_end = threading.Event(), threading.Event()
-    outcomes = []
-
-    def have(do):
-        try:
-            with lock:
-                do()
-        except GymServerError as refusal:
-            outcomes.append(refusal.message)
-
-    stuck = threading.Thread(target=have, args=(lambda: (entered.set(), may_end.wait(10)),))
-    stuck.start()
-    assert entered.wait(10)
-    queued = threading.Thread(target=have, args=(lambda: outcomes.append("entered"),))
-    queued.start()
-    assert lock.abandon(why) == stuck.ident
-    queued.join(10)
-    assert outcomes == ["too long"]
-    assert cleared == []
-    with pytest.raises(GymServerError, match="too long"):
-        lock.acquire(0)
-    may_end.set()
-    # Otherwise its next request might get the answer that is still being sent for this one.
-    stuck.join(0.2)
-    assert stuck.is_alive()
-    lock.answered()
-    stuck.join(10)
-    assert outcomes == ["too long", "too long"]
-    assert cleared == [True]
-    assert lock.abandon(why) is None
+    assert calls.overdue(-1) is None
+    assert not lock.is_held

@@ -15,7 +15,7 @@ from running import descendants, is_running
 from vector_play import MODES_SLOWLY, actions_of
 
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import GymServerError, call_too_long
+from gym_server.errors import GymServerError
 from gym_server.processes.pool import Pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import stack
@@ -192,15 +192,6 @@ def test_a_process_that_ends_takes_its_environment_with_it(make, how, eventually
     assert refusal.value.code == "environment_died"
     eventually(lambda: not any(map(is_running, pids)))
     eventually(lambda: [why.code for why in told] == ["environment_died"])
-
-
-def test_a_kill_ends_a_step_that_hangs(make):
-    env = make("Hanging")
-    env.reset(1, None, None)
-    why = call_too_long("A step", 1, "it is gone")
-    threading.Timer(0.2, env.kill, (why,)).start()
-    with pytest.raises(GymServerError, match="A step took more than"):
-        env.step(None, zeros(env))
 
 
 def test_closing_does_not_wait_for_a_process_that_hangs(make, monkeypatch, eventually):
