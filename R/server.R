@@ -33,8 +33,8 @@ is_running <- function(base) {
 #'   * Limits (with their defaults): `max_total_sub_envs` (of all environments, 400,000),
 #'   `max_processes` (of environments, 128), `max_rollout_processes` (that play whole episodes, one
 #'   per core) and `max_memory_mb` (of all environments, estimated before they are made, 4,096).
-#'   * `max_call_seconds` is the time after which a call fails and its environment is removed (300;
-#'   0 for no limit). `idle_minutes` is the time after which an unused environment is removed
+#'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
+#'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an unused environment is removed
 #'   (1,440; 0 for never).
 #'   * `vignette("server", package = "gym")` describes the options of a server for a group:
 #'   `allow_host`, `no_auth`.

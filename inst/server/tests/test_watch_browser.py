@@ -289,14 +289,14 @@ def test_a_server_that_is_gone_and_comes_back_is_noticed(browser, serve, eventua
     eventually(lambda: text(browser, "words") == "This environment is closed")
 
 
-def test_a_page_says_why_the_server_gave_its_environment_up(browser, serve, eventually):
-    strict = serve("--max-call-seconds", "1")
-    where = {"where": "reset"}
-    url = strict.create("faulty_envs:HangsWhere-v0", kwargs=where, render_mode="rgb_array")
-    browser.get(f"http://127.0.0.1:{strict.port}{url}/watch/")
+def test_a_page_says_why_its_environment_ended(browser, server, eventually):
+    fields = {"num_envs": 1, "num_workers": 1, "kwargs": {"does": "exits"}}
+    url = server.create("faulty_envs:Rogue-v0", **fields)
+    browser.get(f"http://127.0.0.1:{server.port}{url}/watch/")
     eventually(lambda: text(browser, "words") == "Not reset yet")
-    assert strict.post(f"{url}/reset/")[0] == 504
-    eventually(lambda: "took more than 1 seconds" in text(browser, "words"))
+    server.post(f"{url}/reset/")
+    server.post(f"{url}/step/", {"action": [0]})
+    eventually(lambda: "exit status 7" in text(browser, "words"))
     assert text(browser, "state") == "closed"
 
 
