@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import singledispatch
 from typing import Any
 
@@ -10,6 +11,16 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Sp
 
 # The spaces whose batches are one array.
 ARRAYS = (Box, Discrete, MultiBinary, MultiDiscrete)
+
+
+def keyed(space: Tuple | Dict) -> Iterable[tuple[Any, Space]]:
+    """Return the parts of a space, each with the key of that part in a member."""
+    return space.spaces.items() if isinstance(space, Dict) else enumerate(space.spaces)
+
+
+def from_parts(space: Tuple | Dict, values: Iterable) -> Any:
+    """Return a member, or a batch, made of its parts."""
+    return dict(zip(space.spaces, values, strict=True)) if isinstance(space, Dict) else tuple(values)
 
 
 @singledispatch
@@ -30,19 +41,12 @@ def _(space: Space, members: list) -> object:
     return np.array(members, dtype=space.dtype).reshape(len(members), *(space.shape or ()))
 
 
-@stack.register
-def _(space: Tuple, members: list) -> object:
-    return tuple(
-        stack(part, [member[index] for member in members])
-        for index, part in enumerate(space.spaces)
+@stack.register(Tuple)
+@stack.register(Dict)
+def _(space: Any, members: list) -> object:
+    return from_parts(
+        space, [stack(part, [member[key] for member in members]) for key, part in keyed(space)]
     )
-
-
-@stack.register
-def _(space: Dict, members: list) -> object:
-    return {
-        key: stack(part, [member[key] for member in members]) for key, part in space.spaces.items()
-    }
 
 
 @singledispatch
@@ -51,46 +55,28 @@ def unstack(space: Space, batch: Any) -> list:
     return list(batch)
 
 
-@unstack.register
-def _(space: Tuple, batch: tuple) -> list:
-    parts = [unstack(part, items) for part, items in zip(space.spaces, batch, strict=True)]
-    return list(zip(*parts, strict=True))
-
-
-@unstack.register
-def _(space: Dict, batch: dict) -> list:
-    parts = [unstack(part, batch[key]) for key, part in space.spaces.items()]
-    return [dict(zip(space.spaces, member, strict=True)) for member in zip(*parts, strict=True)]
+@unstack.register(Tuple)
+@unstack.register(Dict)
+def _(space: Any, batch: Any) -> list:
+    parts = [unstack(part, batch[key]) for key, part in keyed(space)]
+    return [from_parts(space, member) for member in zip(*parts, strict=True)]
 
 
 def member_of(space: Space, batch: Any, row: int) -> object:
     """Return one member of a batch, in the format of Gymnasium's vector environments."""
-    match space:
-        case Dict():
-            return {key: member_of(part, batch[key], row) for key, part in space.spaces.items()}
-        case Tuple():
-            parts = zip(space.spaces, batch, strict=True)
-            return tuple(member_of(part, items, row) for part, items in parts)
-        case _:
-            return batch[row]
+    if isinstance(space, (Tuple, Dict)):
+        return from_parts(space, [member_of(part, batch[key], row) for key, part in keyed(space)])
+    return batch[row]
 
 
 def join(space: Space, batches: list) -> Any:
     """Concatenate batches in the format of Gymnasium's vector environments."""
     if len(batches) == 1:
         return batches[0]
-    match space:
-        case Tuple():
-            return tuple(
-                join(part, [batch[index] for batch in batches])
-                for index, part in enumerate(space.spaces)
-            )
-        case Dict():
-            return {
-                key: join(part, [batch[key] for batch in batches])
-                for key, part in space.spaces.items()
-            }
-        case _ if isinstance(space, ARRAYS):
-            return np.concatenate(batches)
-        case _:
-            return tuple(member for batch in batches for member in batch)
+    if isinstance(space, (Tuple, Dict)):
+        return from_parts(
+            space, [join(part, [batch[key] for batch in batches]) for key, part in keyed(space)]
+        )
+    if isinstance(space, ARRAYS):
+        return np.concatenate(batches)
+    return tuple(member for batch in batches for member in batch)

@@ -30,7 +30,7 @@ from gym_server.protocol.safetensors import Parts, Tensor, tensor_name
 from gym_server.spaces.arrays import bounds_of
 from gym_server.spaces.discrete import wide_dtype
 from gym_server.spaces.kinds import NotInSpace, decode, encode
-from gym_server.spaces.stacking import ARRAYS
+from gym_server.spaces.stacking import ARRAYS, from_parts, keyed
 
 
 class Rows(NamedTuple):
@@ -92,9 +92,10 @@ def tensor_reader(space: Space, name: str) -> Callable[[Parts, Rows], object]:
     return read
 
 
-@singledispatch
 def travels_as_tensors(space: Space) -> bool:
     """Return whether the members of a space can be sent as tensors."""
+    if isinstance(space, (Tuple, Dict)):
+        return all(travels_as_tensors(part) for _, part in keyed(space))
     return isinstance(space, (*ARRAYS, Text))
 
 
@@ -270,9 +271,8 @@ def _(space: Discrete, name: str) -> Shapes | None:
 @tensor_shapes.register(Tuple)
 @tensor_shapes.register(Dict)
 def _(space: Any, name: str) -> Shapes | None:
-    keyed = space.spaces.items() if isinstance(space, Dict) else enumerate(space.spaces)
     shapes: Shapes = {}
-    for key, part in keyed:
+    for key, part in keyed(space):
         found = tensor_shapes(part, _part_name(name, key))
         if found is None:
             return None
@@ -280,57 +280,27 @@ def _(space: Any, name: str) -> Shapes | None:
     return shapes
 
 
-@travels_as_tensors.register
-def _(space: Tuple) -> bool:
-    return all(map(travels_as_tensors, space.spaces))
-
-
-@_take_apart.register
-def _(space: Tuple, name: str, is_batch: bool) -> TakeApart:
-    parts_of = [
-        _take_apart(part, _part_name(name, index), is_batch)
-        for index, part in enumerate(space.spaces)
+@_take_apart.register(Tuple)
+@_take_apart.register(Dict)
+def _(space: Any, name: str, is_batch: bool) -> TakeApart:
+    takers = [
+        (key, _take_apart(part, _part_name(name, key), is_batch)) for key, part in keyed(space)
     ]
 
     def take_all_apart(value: Any, parts: Parts) -> None:
-        for take_apart, item in zip(parts_of, value, strict=True):
-            take_apart(item, parts)
-
-    return take_all_apart
-
-
-@_put_together.register
-def _(space: Tuple, name: str, path: Path) -> PutTogether:
-    parts_of = [
-        _put_together(part, _part_name(name, index), (*path, index))
-        for index, part in enumerate(space.spaces)
-    ]
-    return lambda *how: tuple([put_together(*how) for put_together in parts_of])
-
-
-@travels_as_tensors.register
-def _(space: Dict) -> bool:
-    return all(map(travels_as_tensors, space.spaces.values()))
-
-
-@_take_apart.register
-def _(space: Dict, name: str, is_batch: bool) -> TakeApart:
-    parts_of = {
-        key: _take_apart(part, _part_name(name, key), is_batch)
-        for key, part in space.spaces.items()
-    }
-
-    def take_all_apart(value: Any, parts: Parts) -> None:
-        for key, take_apart in parts_of.items():
+        for key, take_apart in takers:
             take_apart(value[key], parts)
 
     return take_all_apart
 
 
-@_put_together.register
-def _(space: Dict, name: str, path: Path) -> PutTogether:
-    parts_of = {
-        key: _put_together(part, _part_name(name, key), (*path, str(key)))
-        for key, part in space.spaces.items()
-    }
-    return lambda *how: {key: put_together(*how) for key, put_together in parts_of.items()}
+@_put_together.register(Tuple)
+@_put_together.register(Dict)
+def _(space: Any, name: str, path: Path) -> PutTogether:
+    steps = [
+        _put_together(
+            part, _part_name(name, key), (*path, key if isinstance(space, Tuple) else str(key))
+        )
+        for key, part in keyed(space)
+    ]
+    return lambda *how: from_parts(space, [put_together(*how) for put_together in steps])
