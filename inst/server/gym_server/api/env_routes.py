@@ -6,6 +6,7 @@ from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
+from gym_server.instances.about import about
 from gym_server.protocol.answers import tensor_response
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.protocol.known_headers import loads_tensors
@@ -34,7 +35,7 @@ bp = RouteBlueprint("envs")
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    return call.services.instances.create(EnvConfig(**fields)).about()
+    return about(call.services.instances.create(EnvConfig(**fields)))
 
 
 @bp.declare("GET", "/v1/envs/")
@@ -52,7 +53,7 @@ def instance_list(call: Call) -> dict:
 @bp.declare("GET", INSTANCE)
 def env_about(call: Call) -> dict:
     """Describe an environment."""
-    return call.instance.about()
+    return about(call.instance)
 
 
 @bp.declare(

@@ -59,6 +59,12 @@ def make_env(
         return make_from_spec(spec, chosen, parse_nonfinite(kwargs))
 
 
+def env_id_of(config: EnvConfig, gym_env: Any) -> str:
+    """Return an id that creates the same environment: its module, and the version found."""
+    module, colon, name = str(config.env_id).rpartition(":")
+    return f"{module}{colon}{gym_env.spec.id if gym_env.spec else name}"
+
+
 def check_kwargs(kwargs: dict) -> None:
     """Raise ``invalid_kwargs`` for an argument that is a request parameter."""
     if "render_mode" in kwargs:

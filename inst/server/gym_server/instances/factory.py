@@ -11,7 +11,7 @@ from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.memory_estimate import model_bytes
 from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.instances.local import LocalInstance
+from gym_server.instances.instance import Instance
 from gym_server.instances.single import SingleInstance
 from gym_server.instances.vector import VectorInstance
 from gym_server.rendering.render_thread import RenderThread
@@ -25,7 +25,7 @@ def make_instance(
     renderer: RenderThread,
     undo: contextlib.ExitStack,
     reservation: MemoryReservation,
-) -> LocalInstance:
+) -> Instance:
     """Create an instance whose environment runs in this process.
 
     Args:
@@ -38,7 +38,7 @@ def make_instance(
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
-            and ``LocalInstance``.
+            and ``Instance``.
     """
     with logs.hearing() as warnings:
         if config.num_envs is None:
@@ -46,7 +46,7 @@ def make_instance(
             undo.callback(_quietly, partial(renderer.close, env.close, drawn=False))
             reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
             wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
-            instance: LocalInstance = SingleInstance(wrapped, config, renderer)
+            instance: Instance = SingleInstance(wrapped, config, renderer)
         else:
             sub_envs, mode = make_vector_env(
                 config, allowed_modules, max_num_envs, renderer, reservation

@@ -1,57 +1,86 @@
-"""One environment on the server: its lock, its watchers and its monitor."""
+"""One environment on the server, single or with sub-environments: its lock and its watchers."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from gymnasium.spaces import Space
+
+from gym_server import spaces
 from gym_server.envs.config import EnvConfig
-from gym_server.errors import GymServerError, invalid_parameter, unknown_instance
+from gym_server.envs.drawing import Drawing
+from gym_server.envs.make import call_env, env_id_of
+from gym_server.envs.outcomes import checked_info
+from gym_server.envs.wrappers import time_limit
+from gym_server.errors import GymServerError, invalid_parameter, reset_needed, unknown_instance
+from gym_server.instances.actions import ActionReader
+from gym_server.instances.episode_statistics import (
+    EpisodeStatistics,
+    VectorEpisodeStatistics,
+    facts_of,
+)
+from gym_server.instances.observations import ObservationWriter
+from gym_server.json_values import plain
+from gym_server.monitoring.monitor import Monitor
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
+from gym_server.rendering.png import picture
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.lock import InstanceLock
-from gym_server.viewing.viewer import Viewer
+from gym_server.viewing.observation_summary import entries
+from gym_server.viewing.viewer import Viewer, usable_fps
 from gym_server.viewing.watchable import Watchable
 
 if TYPE_CHECKING:
     import numpy as np
-    from gymnasium.spaces import Space
 
 Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
 
 class Instance(Watchable):
-    """An environment that a client created.
-
-    ``LocalInstance`` implements the methods that start with an underscore, which are called with
-    the lock held.
+    """An environment that a client created; ``SingleInstance`` or ``VectorInstance``.
 
     Every method that resets, steps or draws the environment waits for its lock. If the instance is
-    closed meanwhile, the method raises ``unknown_instance``, or why it was closed.
+    closed meanwhile, the method raises ``unknown_instance``, or why it was closed. Methods that
+    start with an underscore are called with the lock held.
 
     Attributes:
         instance_id: set when the instance is listed; "" before.
         env_id: an id that creates the same environment again.
         config: what its client chose.
+        gym_env: Gymnasium's environment or vector environment.
         single_action_space: the action space of one sub-environment.
         single_observation_space: the observation space of one sub-environment.
+        drawing: draws and closes the environment.
+        statistics: the statistics of its episodes.
         viewer: shows it to watchers.
         steps: the number of steps of its sub-environments.
+        was_reset: whether an episode has begun.
+        created: when it was created, in the clock's seconds.
+        monitor: records its episodes, or None.
+        warnings: Gymnasium's warnings about what was made.
+        vectorization_mode: what runs the sub-environments; None for a single environment.
+        num_workers: the number of worker processes; None for a single environment, and for the
+            environment's own vector implementation.
+        autoreset_mode: when a sub-environment whose episode ended is reset; None as above.
     """
 
-    env_id: str
     single_action_space: Space
     single_observation_space: Space
+    drawing: Drawing
+    statistics: EpisodeStatistics | VectorEpisodeStatistics
+    monitor: Monitor | None = None
+    warnings: Sequence[str] = ()
+    vectorization_mode: str | None = None
+    num_workers: int | None = None
+    autoreset_mode: str | None = None
 
-    def __init__(self, config: EnvConfig, renderer: RenderThread) -> None:
-        """Prepare the lock and the viewer.
+    def __init__(self, env: Any, config: EnvConfig, renderer: RenderThread) -> None:
+        """Take over an environment; subclasses set the spaces first.
 
-        Args:
-            config: what its client chose.
-            renderer: the process's render thread.
+        Raises:
+            GymServerError: ``unsupported_space``.
         """
         self.instance_id = ""
         self.config = config
@@ -62,11 +91,34 @@ class Instance(Watchable):
         )
         self.viewer = Viewer(self)
         self.steps = 0
-        self._is_single = config.num_envs is None
         self._in_real_time = config.render_mode == "human"
-        self._created = self.lock.used
+        self.created = self.lock.used
+        self.gym_env = env
+        self.env_id = env_id_of(config, env)
+        self.single_space_info = {
+            "action_space": spaces.describe(self.single_action_space),
+            "observation_space": spaces.describe(self.single_observation_space),
+        }
+        self._space_info: dict[str, dict] = {}
+        self._actions = ActionReader(self.single_action_space, config.num_envs)
+        is_batch = config.num_envs is not None
+        self._write = ObservationWriter(self.single_observation_space, is_batch)
+        self.render_fps: object = (env.metadata or {}).get("render_fps")
+        self.viewer.fps = usable_fps(self.render_fps)
+        self._seed_for_reset: Seed = config.seed
+        self._seed_bytes = 0
+        self.was_reset = False
+        self._observation: Any = None
+        self.max_episode_steps = time_limit(env)
+        if config.seed is not None:
+            self._seed_actions(config.seed)
 
-    # Resets and steps -----------------------------------------------------------------------
+    def _seed_actions(self, seed: Seed) -> None:
+        # All sub-environments share one generator.
+        seeds = seed if isinstance(seed, tuple) else (seed,)
+        first = next((one for one in seeds if one is not None), None)
+        if first is not None:
+            self.gym_env.action_space.seed(first[0] if isinstance(first, tuple) else first)
 
     def reset(
         self,
@@ -78,9 +130,9 @@ class Instance(Watchable):
         """Start an episode in every sub-environment, or in those of a mask.
 
         Args:
-            seed: seeds the environment and the action space. None leaves both unchanged, or in the
-                first reset uses the seed given at creation. With sub-environments, one seed from
-                which each derives its own, or one seed each.
+            seed: seeds the environment and the action space; None for neither, or in the first
+                reset for the seed given at creation. With sub-environments, one from which each
+                derives its own, or one each.
             options: options for the environment.
             form: the format of the response.
             mask: a boolean per sub-environment; None for all.
@@ -93,10 +145,6 @@ class Instance(Watchable):
             GymServerError: ``invalid_parameter``, ``not_supported``, ``reset_needed`` (a mask
                 before the first reset); ``environment_error``.
         """
-        if self._is_single:
-            _refuse_mask("reset_mask", mask)
-            if isinstance(seed, tuple):
-                raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         if self._in_real_time:
             self.viewer.pace()
         with self.lock:
@@ -132,8 +180,6 @@ class Instance(Watchable):
                 reset automatically), ``action_not_in_space``, ``invalid_parameter`` or
                 ``not_supported``, each before the environment is stepped; ``environment_error``.
         """
-        if mask is not None and self._is_single:
-            _refuse_mask("step_mask", mask)
         if in_real_time or self._in_real_time:
             self.viewer.pace()
         with self.lock:
@@ -141,12 +187,52 @@ class Instance(Watchable):
             return self._step(action, form, mask)
 
     def sample_action(self) -> object:
-        """Sample an action, for each sub-environment, with the action space's generator."""
+        """Sample an action, for each sub-environment."""
         with self.lock:
             self.lock.call = "sample_action"
             return self._sample_action()
 
-    # Looks ----------------------------------------------------------------------------------
+    def _reset(
+        self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
+    ) -> dict:
+        self._check_reset(seed, options, mask)
+        seed_to_use = self._seed_for_reset if seed is None else seed
+        self.was_reset = False
+        observation, info = call_env(self._begin, self._reset_env, seed_to_use, options, mask, form)
+        if form.infos:
+            checked_info(info)
+        self._seed_for_reset = None
+        self._seed_bytes = _held_by(seed)
+        if seed is not None and mask is None:
+            self._seed_actions(seed)
+        self.was_reset = True
+        self.statistics.begin(mask)
+        self._observation = observation
+        return {
+            "observation": call_env(self._write, observation, form),
+            "info": call_env(plain, info) if form.infos else {},
+        }
+
+    def _check_reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> None:
+        raise NotImplementedError
+
+    def _reset_env(
+        self, seed: Any, options: dict | None, mask: np.ndarray | None, form: AnswerForm
+    ) -> tuple:
+        raise NotImplementedError
+
+    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
+        raise NotImplementedError
+
+    def _sample_action(self) -> object:
+        raise NotImplementedError
+
+    def _begin(self, reset_or_step: Callable[..., tuple], *args: object) -> tuple:
+        """Reset or step the environment, on the render thread if it draws meanwhile."""
+        self.begin_reset_or_step()
+        if self.draws_when_stepped:
+            return self.renderer.run(reset_or_step, *args)
+        return reset_or_step(*args)
 
     def render(self, sub_env: int = 0) -> np.ndarray:
         """Draw the current state of a sub-environment; see ``png.picture()`` for the array.
@@ -166,128 +252,128 @@ class Instance(Watchable):
             last = f"an integer from 0 to {num_envs - 1}" if num_envs > 1 else "0"
             raise invalid_parameter("sub_env", sub_env, f"{last} for this environment")
 
-    def transition_model(self) -> dict:
-        """Return the transition model of an environment that has one.
+    def _render(self, sub_env: int) -> np.ndarray:
+        if self.gym_env.render_mode != "rgb_array":
+            raise GymServerError(
+                "cannot_render", f"{self.env_id} draws no pictures", "see its render_modes"
+            )
+        if not self.was_reset:
+            raise reset_needed("render()")
+        frame = call_env(self.draw, sub_env)
+        try:
+            return picture(frame)
+        except ValueError as error:
+            raise GymServerError(
+                "cannot_render", f"{self.env_id} does not return a picture: {error}"
+            ) from error
 
-        Returns:
-            ``{"model"}``, see ``envs.transition_model``.
+    def draw(self, sub_env: int) -> object:
+        """Draw a sub-environment; return the result unchecked."""
+        raise NotImplementedError
+
+    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
+        facts = {
+            "env_id": self.env_id,
+            "sub_env": sub_env,
+            "num_envs": self.config.num_envs,
+            **facts_of(self.statistics, sub_env),
+            "reward_threshold": getattr(self.gym_env.spec, "reward_threshold", None),
+            "steps": self.steps,
+            "fps": self.viewer.fps if self.config.render_mode == "human" else None,
+        }
+        if not self.was_reset:
+            return {**facts, "state": "not_reset"}, None
+        try:
+            return facts, self._render(sub_env)
+        except GymServerError as refusal:
+            reason = {"why_no_picture": refusal.message, "hint": refusal.hint}
+            return {**facts, **reason, "observation": entries(self._observed(sub_env))}, None
+
+    def _observed(self, sub_env: int) -> object:
+        raise NotImplementedError
+
+    def transition_model(self) -> dict:
+        """Return ``{"model"}``, see ``envs.transition_model``.
 
         Raises:
             GymServerError: ``not_supported``; ``environment_error``.
         """
-        if not self._is_single:
-            raise GymServerError(
-                "not_supported",
-                f"{self.env_id} has sub-environments here, and only single environments have a "
-                "transition model",
-                "create it without num_envs",
-            )
-        with self.lock:
-            self.lock.call = "transition_model"
-            return self._transition_model()
-
-    # At any time ----------------------------------------------------------------------------
+        raise GymServerError(
+            "not_supported",
+            f"{self.env_id} has sub-environments here, and only single environments have a "
+            "transition model",
+            "create it without num_envs",
+        )
 
     def space_info(self, name: str) -> dict:
-        """Return the description of a space; with sub-environments, of the batched space.
-
-        Args:
-            name: "action_space" or "observation_space".
-        """
-        raise NotImplementedError
+        """Return the description of a space by its name, of a batched one with sub-environments."""
+        # That of a large vector environment is large.
+        if name not in self._space_info:
+            self._space_info[name] = spaces.describe(getattr(self.gym_env, name))
+        return self._space_info[name]
 
     def contains(self, name: str, claim: dict) -> bool:
         """Answer a client's "contains" question; see ``spaces.contains()``.
 
-        Args:
-            name: the space, as for ``space_info()``.
-            claim: with sub-environments, its value has an entry for each.
+        With sub-environments, the claim's value has an entry for each.
         """
+        space: Space = getattr(self, f"single_{name}")
+        return spaces.contains(
+            claim, lambda value: self._decode(space, value), lambda: self.space_info(name)
+        )
+
+    def _decode(self, space: Space, value: object) -> object:
+        """Decode JSON to a member of the space, or to one per sub-environment."""
         raise NotImplementedError
 
-    def list_entry(self) -> dict:
-        """Return the entry in the list of instances."""
-        now = time.monotonic()
-        return {
-            "instance_id": self.instance_id,
-            "env_id": self.env_id,
-            "name": self.config.name,
-            "num_envs": self.config.num_envs,
-            "age_seconds": now - self._created,
-            "idle_seconds": now - self.lock.used,
-            "steps": self.steps,
-            "watched": self.viewer.is_watched,
-        }
-
-    def about(self) -> dict:
-        """Return everything known about the instance, without waiting for its environment."""
-        return {**self.list_entry(), **self._about()}
+    @property
+    def has_ended(self) -> bool:
+        """Whether an episode ended that only the client can reset."""
+        raise NotImplementedError
 
     @property
     def grown(self) -> int:
-        """By how many bytes drawing and seeds have made the server's process grow."""
-        return 0
+        """By how many bytes drawing and seeds have made this process grow."""
+        return self.drawing.grown + self._seed_bytes
 
     @property
     def pids(self) -> Sequence[int]:
         """The processes that run it, besides the server's."""
         return ()
 
-    # Monitors -------------------------------------------------------------------------------
-
     def start_monitor(
         self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        """Record the episodes that start from now on; see ``Monitor``."""
-        if not self._is_single:
-            raise GymServerError(
-                "not_supported",
-                f"Instance {self.instance_id} has sub-environments, and monitors record only "
-                "single environments",
-                "create it without num_envs",
-            )
-        with self.lock:
-            self.lock.call = "start_monitor"
-            self._record(root.resolve(directory), directory, force, resume, video_every)
-
-    def _record(
-        self, path: Path, directory: str, force: bool, resume: bool, video_every: int
-    ) -> None:
-        """Record the episodes that start from now on.
+        """Record the episodes that start from now on; see ``Monitor`` and ``take_directory()``.
 
         Args:
-            path: the directory, already checked; see ``take_directory()``, also for the next three.
-            directory: its name as the client sent it.
+            root: the directories that monitors may write to.
+            directory: the directory's name as the client sent it.
             force: whether to delete its contents.
             resume: whether to continue the numbering.
-            video_every: record a video of every episode whose number is a multiple; 0 for none.
+            video_every: record every episode whose number is a multiple as a video; 0 for none.
         """
-        raise NotImplementedError
+        raise GymServerError(
+            "not_supported",
+            f"Instance {self.instance_id} has sub-environments, and monitors record only single "
+            "environments",
+            "create it without num_envs",
+        )
 
     def close_monitor(self) -> None:
-        """Stop recording, if active, and finish the files.
-
-        Raises:
-            GymServerError: ``monitor_directory`` if something could not be written.
-        """
+        """Stop recording, if active; raise ``monitor_directory`` if something was not written."""
         with self.lock:
             self.lock.call = "close_monitor"
-            self._close_monitor()
+            self._end_monitor()
 
-    # Beginning and end ----------------------------------------------------------------------
+    def _end_monitor(self) -> None:
+        monitor, self.monitor = self.monitor, None
+        if monitor is not None:
+            monitor.close()
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Report from now on if the environment's process ends unexpectedly, or at once if it has.
-
-        Args:
-            on_end: called with the reason, after the watchers were told.
-        """
-
-        def end(why: GymServerError) -> None:
-            self.viewer.end(why)
-            on_end(why)
-
-        self._report_end(end)
+        """Report a process that ends unexpectedly, after its watchers, from now on or at once."""
 
     def close(self) -> None:
         """Finish the monitor and close the environment; waiting calls get an error."""
@@ -296,47 +382,16 @@ class Instance(Watchable):
             why = self.lock.refusal()
             self.lock.closed = True
             self.viewer.end(why)
-            self._close(why)
+            try:
+                self._end_monitor()
+            finally:
+                call_env(self._close_env)
 
-    # What differs ---------------------------------------------------------------------------
-
-    def _reset(
-        self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
-    ) -> dict:
-        raise NotImplementedError
-
-    def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
-        raise NotImplementedError
-
-    def _sample_action(self) -> object:
-        raise NotImplementedError
-
-    def _render(self, sub_env: int) -> np.ndarray:
-        raise NotImplementedError
-
-    def _transition_model(self) -> dict:
-        raise NotImplementedError
-
-    def _close_monitor(self) -> None:
-        """Stop recording, if active, and finish the files."""
-        raise NotImplementedError
-
-    def _about(self) -> dict:
-        """Return everything known about the environment, without waiting for it."""
-        raise NotImplementedError
-
-    def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        raise NotImplementedError
-
-    def _close(self, why: GymServerError) -> None:
-        """Finish the monitor and close the environment; later calls raise the reason."""
+    def _close_env(self) -> None:
         raise NotImplementedError
 
 
-def _refuse_mask(name: str, mask: np.ndarray | None) -> None:
-    if mask is not None:
-        raise GymServerError(
-            "not_supported",
-            f"'{name}' is for environments with sub-environments",
-            "create it with num_envs",
-        )
+def _held_by(seed: Seed) -> int:
+    """Return the bytes of seeds for later episodes, which are objects in lists."""
+    lists = [one for one in seed if isinstance(one, tuple)] if isinstance(seed, tuple) else []
+    return 40 * sum(map(len, lists))

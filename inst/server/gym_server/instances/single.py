@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -15,13 +13,14 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info, reward_number
+from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import draws_when_stepped
-from gym_server.errors import GymServerError, reset_needed
+from gym_server.errors import GymServerError, invalid_parameter, reset_needed
 from gym_server.instances.episode_statistics import EpisodeStatistics
-from gym_server.instances.local import LocalInstance
+from gym_server.instances.instance import Instance
 from gym_server.json_values import plain
 from gym_server.monitoring.monitor import Monitor, require_video
-from gym_server.monitoring.monitor_directory import take_directory
+from gym_server.monitoring.monitor_directory import MonitorRoot, take_directory
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
@@ -29,14 +28,14 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-class SingleInstance(LocalInstance):
+class SingleInstance(Instance):
     """A single environment in this process."""
 
     has_ended = False
     statistics: EpisodeStatistics
 
     def __init__(self, env: gymnasium.Env, config: EnvConfig, renderer: RenderThread) -> None:
-        """Take over an environment; see ``LocalInstance``."""
+        """Take over an environment; see ``Instance``."""
         self.single_action_space = env.action_space
         self.single_observation_space = env.observation_space
         super().__init__(env, config, renderer)
@@ -44,20 +43,23 @@ class SingleInstance(LocalInstance):
         self.draws_on_render_thread = env.render_mode == "rgb_array"
         self.drawing = Drawing(renderer, self.draws_when_stepped)
         self.statistics = EpisodeStatistics()
-        self._monitor: Monitor | None = None
 
     def _check_reset(self, seed: object, options: dict | None, mask: np.ndarray | None) -> None:
+        _refuse_mask("reset_mask", mask)
+        if isinstance(seed, tuple):
+            raise invalid_parameter("seed", seed, "an integer, 0 or greater")
         argument_limits.check_reset_options(self.gym_env, options)
 
     def _reset_env(
         self, seed: Any, options: dict | None, mask: np.ndarray | None, form: AnswerForm
     ) -> tuple:
-        start: tuple = (self._monitor or self.gym_env).reset(seed=seed, options=options)
+        start: tuple = (self.monitor or self.gym_env).reset(seed=seed, options=options)
         self.has_ended = False
         return start
 
     def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
-        if not self._was_reset:
+        _refuse_mask("step_mask", mask)
+        if not self.was_reset:
             raise reset_needed("step()")
         decoded = self._actions.read(action)
         try:
@@ -67,7 +69,7 @@ class SingleInstance(LocalInstance):
             raise
 
     def _step_env(self, action: object, form: AnswerForm) -> dict:
-        outcome = self._begin((self._monitor or self.gym_env).step, action)
+        outcome = self._begin((self.monitor or self.gym_env).step, action)
         observation, reward, terminated, truncated, info = outcome
         terminated, truncated = bool(terminated), bool(truncated)
         self.has_ended = done = terminated or truncated
@@ -76,7 +78,7 @@ class SingleInstance(LocalInstance):
         self.steps += 1
         self._observation = observation
         return {
-            "observation": self._encode(observation, form),
+            "observation": self._write(observation, form),
             "reward": reward,
             "done": done,
             "terminated": terminated,
@@ -98,40 +100,40 @@ class SingleInstance(LocalInstance):
         """Draw the environment on the render thread."""
         return self.drawing.draw(self.gym_env.render)
 
-    def _about(self) -> dict:
-        monitor = self._monitor
-        return {
-            **super()._about(),
-            "episode_steps": self.statistics.of(0).step,
-            "monitor": monitor.about() if monitor else None,
-        }
+    def transition_model(self) -> dict:
+        """Return the transition model of an environment that has one."""
+        with self.lock:
+            self.lock.call = "transition_model"
+            return {"model": call_env(transition_model, self.gym_env, self.env_id)}
 
-    # Monitors -------------------------------------------------------------------------------
-
-    def _record(
-        self, path: Path, directory: str, force: bool, resume: bool, video_every: int
+    def start_monitor(
+        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
-        """Record the episodes that start from now on; see ``Instance._record()``."""
-        if self._monitor is not None:
-            raise GymServerError(
-                "monitor_active",
-                f"Instance {self.instance_id} is already monitored",
-                "close that monitor first",
-            )
-        if video_every:
-            require_video(self.gym_env)
-        taken = take_directory(path, directory, self.instance_id, force, resume)
-        self._monitor = Monitor(self.gym_env, taken, video_every, lambda: self.draw(0))
-
-    def _close_monitor(self) -> None:
-        monitor, self._monitor = self._monitor, None
-        if monitor is not None:
-            monitor.close()
+        """Record the episodes that start from now on; see ``Instance.start_monitor()``."""
+        with self.lock:
+            self.lock.call = "start_monitor"
+            path = root.resolve(directory)
+            if self.monitor is not None:
+                raise GymServerError(
+                    "monitor_active",
+                    f"Instance {self.instance_id} is already monitored",
+                    "close that monitor first",
+                )
+            if video_every:
+                require_video(self.gym_env)
+            taken = take_directory(path, directory, self.instance_id, force, resume)
+            self.monitor = Monitor(self.gym_env, taken, video_every, lambda: self.draw(0))
 
     # The end --------------------------------------------------------------------------------
 
     def _close_env(self) -> None:
         self.drawing.close(self.gym_env.close)
 
-    def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        """Do nothing: this process does not end by itself."""
+
+def _refuse_mask(name: str, mask: np.ndarray | None) -> None:
+    if mask is not None:
+        raise GymServerError(
+            "not_supported",
+            f"'{name}' is for environments with sub-environments",
+            "create it with num_envs",
+        )

@@ -16,7 +16,7 @@ from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed, wrong_length
 from gym_server.instances.episode_statistics import VectorEpisodeStatistics
-from gym_server.instances.local import LocalInstance
+from gym_server.instances.instance import Instance
 from gym_server.json_values import plain
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
@@ -24,7 +24,7 @@ from gym_server.vector_envs.entry_point import EntryPointEnv, why_seed_too_large
 from gym_server.vector_envs.sub_envs import SubEnvs
 
 
-class VectorInstance(LocalInstance):
+class VectorInstance(Instance):
     """A vector environment, whose sub-environments run in this process or in workers."""
 
     statistics: VectorEpisodeStatistics
@@ -108,7 +108,7 @@ class VectorInstance(LocalInstance):
         self._check_mask("reset_mask", mask)
         if not self.gym_env.resets_each:
             raise self._not_supported("reset_mask")
-        if not self._was_reset:
+        if not self.was_reset:
             raise GymServerError(
                 "reset_needed",
                 "reset() with a mask needs sub-environments that were reset before",
@@ -140,7 +140,7 @@ class VectorInstance(LocalInstance):
     # Step -----------------------------------------------------------------------------------
 
     def _step(self, action: object, form: AnswerForm, mask: np.ndarray | None) -> dict:
-        if not self._was_reset:
+        if not self.was_reset:
             raise reset_needed("step()")
         which = None if mask is None else self._select(mask)
         rows = None if which is None else len(which)
@@ -150,7 +150,7 @@ class VectorInstance(LocalInstance):
             return call_env(self._step_env, which, decoded, form)
         except GymServerError as failure:
             # Some sub-environments may have taken the step, and others not.
-            self._was_reset = False
+            self.was_reset = False
             self._actions.explain(failure, decoded, rows)
             raise
 
@@ -187,7 +187,7 @@ class VectorInstance(LocalInstance):
         self._observation = observation
         final = self._take_final(info, form) if info else {}
         answer = {
-            "observation": self._encode(observation, form),
+            "observation": self._write(observation, form),
             "reward": reward,
             "terminated": terminated,
             "truncated": truncated,
@@ -221,7 +221,7 @@ class VectorInstance(LocalInstance):
         rows = np.flatnonzero(which)
         batch = spaces.stack(self.single_observation_space, [final[row] for row in rows])
         return {
-            "final_obs": self._encode(batch, form, "final_obs"),
+            "final_obs": self._write(batch, form, "final_obs"),
             "final_sub_envs": rows.tolist(),
         }
 
@@ -254,14 +254,17 @@ class VectorInstance(LocalInstance):
 
     # The end --------------------------------------------------------------------------------
 
-    def _close_monitor(self) -> None:
-        """Do nothing: monitors record single environments."""
-
     def _close_env(self) -> None:
         self.gym_env.close()
 
-    def _report_end(self, on_end: Callable[[GymServerError], None]) -> None:
-        self.gym_env.report_end(on_end)
+    def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
+        """Report the end of a worker process; see ``Instance.report_end()``."""
+
+        def end(why: GymServerError) -> None:
+            self.viewer.end(why)
+            on_end(why)
+
+        self.gym_env.report_end(end)
 
 
 def _has_empty_part(space: Space) -> bool:

@@ -23,6 +23,7 @@ from gym_server.errors import (
     shutting_down,
     unknown_instance,
 )
+from gym_server.instances.about import list_entry
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
 from gym_server.manager.account import Account
@@ -267,7 +268,7 @@ class InstanceManager:
 
     def list(self) -> list[dict]:
         """Return the list entries of all instances, oldest first, without waiting for any."""
-        return [instance.list_entry() for instance in self._all()]
+        return [list_entry(instance) for instance in self._all()]
 
     def _remove(self, instance_id: str, why: GymServerError) -> None:
         """Remove an instance whose process has ended; keep the reason."""

@@ -19,7 +19,6 @@ from gym_server.envs.drawing_on_demand import save_drawing
 from gym_server.envs.extras import engine_versions
 from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.quick_choice import choose_quickly
-from gym_server.instances.local import env_id_of
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
 from gym_server.vector_envs.make_vec import make_own_implementation
@@ -139,7 +138,7 @@ class RolloutEnv:
         """Return what a client must know to make a policy for the environment."""
         config, spec = self._task.config, self.env.spec
         metadata = self.env.metadata or {}
-        env_id = env_id_of(config, self.env)
+        env_id = make.env_id_of(config, self.env)
         return {
             "env_id": env_id,
             "observation_space": spaces.describe(self.observation_space),

@@ -20,7 +20,9 @@ def keyed(space: Tuple | Dict) -> Iterable[tuple[Any, Space]]:
 
 def from_parts(space: Tuple | Dict, values: Iterable) -> Any:
     """Return a member, or a batch, made of its parts."""
-    return dict(zip(space.spaces, values, strict=True)) if isinstance(space, Dict) else tuple(values)
+    return (
+        dict(zip(space.spaces, values, strict=True)) if isinstance(space, Dict) else tuple(values)
+    )
 
 
 @singledispatch

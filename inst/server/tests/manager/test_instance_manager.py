@@ -62,7 +62,7 @@ def test_who_waits_for_an_instance_that_closes_learns_that_it_is_gone(
         time.sleep(0.2)
         instance.lock.closed = True
     assert waiting().json["message"] == f"Instance_id {instance.instance_id} unknown"
-    assert instance.about()["steps"] == 0
+    assert instance.steps == 0
 
 
 def test_steps_that_meet_a_close_are_taken_or_refused(client, faulty, in_background):

@@ -38,7 +38,7 @@ def occupied(app, client, faulty, watch):
 
 def waits_for_its_turn(app):
     """Return whether a watcher waits for another one that has the render thread."""
-    return len(app._renderer._jobs) > 1
+    return app._renderer._queue.qsize() > 0
 
 
 def test_a_watcher_that_waits_for_others_drawing_holds_up_no_step(
