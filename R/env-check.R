@@ -3,8 +3,8 @@
 #' Check the spaces, play a few episodes with random actions and check all results, like Gymnasium's
 #' `check_env()`. It finds observations outside their space, rewards that are not finite numbers,
 #' flags that are not `TRUE` or `FALSE`, seeds that do not reproduce an episode, random numbers from
-#' the session's generator, episodes that never end, and frames that cannot be drawn. If possible, it
-#' continues after a problem.
+#' the session's generator, episodes that never end, and frames that cannot be drawn. If possible,
+#' it continues after a problem.
 #'
 #' It plays two episodes, with the seeds `seed` and `seed + 1`. It then repeats the first one with
 #' the same actions, which must give the same results, bit for bit. All sub-environments of a vector

@@ -61,9 +61,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
       }
     }
   }
-  changed <- watch_policies(batch$policy)
-  with_generator(new_generator(stream = stream), naming_call(play(), vector_env, changed))
-  warn_of_memory(changed())
+  with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
   columns <- c("candidate", "episode", "seed", "sub_env", "return", "length", "terminated",
                "truncated")
   kept <- mget(c("steps", "frames"), batch)
@@ -74,25 +72,21 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   c(episodes, kept)
 }
 
-# An error names the user's call instead of a step that the user did not take, and its reason in the
-# policy.
-naming_call <- function(code, vector_env, changed = function() NULL) {
+# An error names the user's call instead of a step that the user did not take.
+naming_call <- function(code, vector_env) {
   withCallingHandlers(
     code,
     error = function(cnd) {
       if (!inherits(cnd, "gym_error") && is_about_one(cnd)) abort_about_one(cnd, vector_env)
     },
     gym_error = function(cnd) {
-      own_step <- is_own_step(cnd$call)
+      if (!is_own_step(cnd$call)) return()
+      cnd["call"] <- list(rlang::error_call(vector_env$call))
       # Errors about an observation name the argument that is to blame.
-      hint <- if (own_step && inherits(cnd, "gym_error_space") && is.null(cnd$argument)) {
-        "The policy returned this action."
-      } else if (inherits(cnd, "gym_error_argument") && identical(cnd$argument, "policy")) {
-        memory_hint(changed())
+      if (inherits(cnd, "gym_error_space") && is.null(cnd$argument)) {
+        cnd <- with_hint(cnd, "The policy returned this action.")
       }
-      if (own_step) cnd["call"] <- list(rlang::error_call(vector_env$call))
-      if (length(hint)) cnd <- with_hint(cnd, hint)
-      if (own_step || length(hint)) rlang::cnd_signal(cnd)
+      rlang::cnd_signal(cnd)
     }
   )
 }

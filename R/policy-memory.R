@@ -14,8 +14,7 @@
 #' in a list with other policies. [saveRDS()] saves it like a function.
 #'
 #' A plain function that remembers something by `<<-` does not work. [rollout()] passes it several
-#' episodes in one call, and a new episode would start with the memory of another. `rollout()` warns
-#' if it notices this.
+#' episodes in one call, and a new episode would start with the memory of another.
 #'
 #' @param act A function of `observation` and `memory`. `observation` has many observations, as for
 #'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows.
@@ -202,69 +201,5 @@ memory_form <- function(initial) {
     place <- if (is.null(name)) "1" else paste0("\"", name, "\"")
     paste0("`memory` is a matrix with a row for each episode: `memory[, ", place,
            "]`. With a list as `initial` it is a data frame.")
-  }
-}
-
-# Functions that remember ------------------------------------------------------------------
-
-# Watches the variables of all functions among the policies.
-watch_policies <- function(policy) {
-  each <- if (inherits(policy, "gym_policy_list")) unclass(policy) else list(policy)
-  watched <- lapply(Filter(is.function, each), watch_variables)
-  function() unlist(lapply(watched, function(changed) changed()))
-}
-
-#' Watch the variables that a function uses outside itself
-#'
-#' @return A function that returns the names of the variables, in the function's environment or the
-#'   global one, that have changed since.
-#' @noRd
-watch_variables <- function(policy) {
-  used <- all.names(body(policy))
-  where <- environment(policy)
-  places <- list()
-  while (!is.null(where) && !isNamespace(where) && !identical(where, emptyenv())) {
-    places <- c(places, where)
-    if (identical(where, globalenv())) break
-    where <- parent.env(where)
-  }
-  state <- function() {
-    unlist(lapply(places, variables_now, used), recursive = FALSE)
-  }
-  before <- state()
-  function() {
-    after <- state()
-    same <- vapply(names(after), function(name) identical(after[[name]], before[[name]]), NA)
-    names(after)[!same]
-  }
-}
-
-# Objects that are environments represent something outside R and change for their own reasons.
-# Other environments are compared by their contents.
-variables_now <- function(place, names) {
-  names <- intersect(names, names(place))
-  names <- names[!vapply(names, bindingIsActive, NA, env = place)]
-  values <- Filter(function(x) !is.function(x) && !(is.environment(x) && is.object(x)),
-                   mget(names, place))
-  lapply(values, function(x) if (is.environment(x)) as.list(x, sorted = TRUE) else x)
-}
-
-# A warning for each variable, because the next function that remembers is another mistake.
-warn_of_memory <- function(changed) {
-  if (length(changed)) {
-    rlang::warn(
-      c(paste0("The policy changes `", changed[[1L]], "` outside of itself from call to call: ",
-               "episodes that are played together, or one after the other, share it."),
-        i = "`policy_memory()` makes a policy with a memory for each episode."),
-      class = "gym_warning_memory", .frequency = "once",
-      .frequency_id = paste("gym_policy_changes", changed[[1L]])
-    )
-  }
-}
-
-memory_hint <- function(changed) {
-  if (length(changed)) {
-    paste0("It changes `", changed[[1L]], "` from call to call, and each call has other episodes: ",
-           "`policy_memory()` makes a policy with a memory for each.")
   }
 }

@@ -31,10 +31,6 @@ check_predictions <- function(policy, predicted, n, width, call) {
     hint <- if (right && discrete) {
       paste("If these are probabilities, name the type that gives the most probable action,",
             "such as `as_policy(model, type = \"class\")`")
-    } else if (is.list(predicted) && length(names(predicted))) {
-      paste0("It is a list of ", few_names(names(predicted)), ". Play a function that takes the ",
-             "actions from it, such as `function(observation) predict(model, ",
-             "as.data.frame(observation))$", names(predicted)[[1L]], "`")
     } else if (right) {
       paste0("An action of ", format(policy$action_space), " has ", count_of(width, "number"))
     }

@@ -33,7 +33,7 @@ check_response <- function(policy, space, env_id, call) {
 response_numbers <- function(policy) {
   model <- policy$model
   chooses <- !is.null(policy$labels) || any(policy$arguments$type %in% c("class", "prob"))
-  if (chooses || isS4(model) || !is.list(model)) {
+  if (chooses || !is.null(policy$predict)) {
     return(numeric())
   }
   response <- if (is.data.frame(model[["model"]])) {

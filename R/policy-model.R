@@ -1,13 +1,15 @@
 #' Make a policy from a fitted model
 #'
 #' The model's prediction becomes the action. You can learn a policy from the steps of another one:
-#' fit a model of the action, given the parts of the observation, and play it.
+#' fit a model of the action, given the parts of the observation, and play it. Models of [lm()],
+#' [glm()], `rpart::rpart()` and `nnet::nnet()` are known. For any other model, `predict` says how
+#' it predicts.
 #'
 #' # Observations
 #'
 #' The model gets a data frame with a row for each observation and the column names of the table of
-#' steps of a [rollout()]. A model without a formula (no `terms()`), such as `nnet::nnet(x, y)`,
-#' gets a matrix with these columns.
+#' steps of a [rollout()]. A network of `nnet::nnet(x, y)`, which has no formula, gets a matrix with
+#' these columns.
 #'
 #' # From a prediction to an action
 #'
@@ -25,29 +27,34 @@
 #' If actions are a Box, predictions are the actions: a numeric vector or, for actions of several
 #' numbers, a matrix with an action in each row, as from [lm()] of `cbind(action_1, action_2)`.
 #'
-#' @param x A fitted model with a method for [predict()], for instance of [lm()], [glm()],
-#'   `rpart::rpart()` or `nnet::nnet()`. Policies and functions of observations are returned
-#'   unchanged. A training, a search or a rollout returns its policy.
-#' @param ... Further arguments of the model's `predict()`.
-#' @param type The `type` for `predict()`, a string. The default for a [glm()] is `"response"`; for
-#'   `rpart::rpart()` `"class"` for a classification, otherwise `"vector"`; for `nnet::nnet()`
-#'   `"class"` if it was fitted to a factor, otherwise `"raw"`. Other models get no `type` by
-#'   default.
+#' @param x A fitted model. Policies and functions of observations are returned unchanged. A
+#'   training, a search or a rollout returns its policy.
+#' @param ... Further arguments of the model's [predict()], or of `predict`, by name. The default of
+#'   `type` for a [glm()] is `"response"`; for `rpart::rpart()` `"class"` for a classification,
+#'   otherwise `"vector"`; for `nnet::nnet()` `"class"` if it was fitted to a factor, otherwise
+#'   `"raw"`.
+#' @param predict `NULL` for a known model, or a function of the model and a data frame of
+#'   observations that returns their actions in one of the forms below, such as
+#'   `function(model, newdata) predict(model, newdata)$predictions`.
 #' @return A policy; for a model one of class `gym_policy_model`, a list with the elements `model`,
-#'   `arguments` (a list: those of `predict()`), `labels` (the two levels of a binomial [glm()]'s
-#'   factor, otherwise `NULL`), `package` (the package of its method, a string or `NULL`),
+#'   `predict`, `arguments` (a list: those of `predict()`), `labels` (the two levels of a binomial
+#'   [glm()]'s factor, otherwise `NULL`), `package` (the package of its method, a string or `NULL`),
 #'   `observation_space`, `action_space` and `env_id` (`NULL` until it is played).
-#' @section Errors: `gym_error_argument` if there is no method for `predict()`, or, while it is
+#' @section Errors: `gym_error_argument` for an unknown model without `predict`, or, while it is
 #'   played, if `predict()` fails or its result is not an action.
 #' @section Warnings: `gym_warning_response`, once a session for each formula, if a model was
 #'   fitted to numbers that are no actions, such as the codes of a factor, or is a regression on
 #'   more than two actions.
 #' @export
 #' @examples
-#' # A model of any kind that predicts: here one that was fitted to made-up data.
+#' # A model that was fitted to made-up data.
 #' steps <- data.frame(pole_angle = rnorm(100))
 #' steps$action <- as.integer(steps$pole_angle + rnorm(100, sd = 0.5) > 0)
 #' as_policy(glm(action ~ pole_angle, binomial, steps))
+#'
+#' # A model of another kind.
+#' fit <- loess(action ~ pole_angle, steps)
+#' as_policy(fit, predict = function(model, newdata) predict(model, newdata) > 0.5)
 #'
 #' @examplesIf gym:::can_start_server()
 #' # Learn from a policy that is good, without knowing how it decides.
@@ -57,13 +64,14 @@
 #' rollout("CartPole-v1", as_policy(fit), episodes = 20, seed = 2)
 as_policy <- function(x, ...) UseMethod("as_policy")
 
+#' @rdname as_policy
 #' @export
-as_policy.default <- function(x, ...) {
-  if (has_act_method(x)) {
+as_policy.default <- function(x, ..., predict = NULL) {
+  if (has_method(x, "act")) {
     check_dots_empty(...)
     return(x)
   }
-  new_model_policy(x, list(...))
+  new_model_policy(x, list(...), predict)
 }
 
 #' @export
@@ -88,79 +96,69 @@ as_policy.gym_training <- function(x, ...) {
 #' @export
 as_policy.gym_rollout <- as_policy.gym_training
 
-#' @rdname as_policy
-#' @export
-as_policy.glm <- function(x, ..., type = "response") {
-  labels <- if (identical(x$family$family, "binomial")) levels(stats::model.frame(x)[[1L]])
-  if (length(labels) > 2L) {
-    gym_abort(
-      c(paste0("A binomial model tells two actions apart, but its response has ", length(labels),
-               " levels."),
-        i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."),
-      class = "gym_error_argument", argument = "x", value = x
-    )
-  }
-  new_model_policy(x, list(type = type, ...), if (type == "response") labels)
-}
-
-#' @rdname as_policy
-#' @export
-as_policy.rpart <- function(x, ..., type = NULL) {
-  type <- type %||% if (identical(x$method, "class")) "class" else "vector"
-  new_model_policy(x, list(type = type, ...))
-}
-
-#' @rdname as_policy
-#' @export
-as_policy.nnet <- function(x, ..., type = NULL) {
-  type <- type %||% if (is.null(x$lev)) "raw" else "class"
-  new_model_policy(x, list(type = type, ...))
-}
-
 #' Make a policy from a model
-#' @param labels The two levels that a probability distinguishes; `NULL` for other predictions.
+#' @param predict A function for predictions, or `NULL` for a model that is known.
 #' @noRd
-new_model_policy <- function(model, arguments, labels = NULL, call = rlang::caller_env()) {
-  method <- predict_method(model)
-  if (is.null(method)) {
-    abort_no_model(model, call)
+new_model_policy <- function(model, arguments, predict, call = rlang::caller_env()) {
+  known <- if (is.null(predict)) model_defaults(model, arguments$type, call)
+  if (is.null(predict) && is.null(known)) abort_no_model(model, call)
+  if (!is.null(predict) && !is.function(predict)) {
+    abort_argument(predict, "a function of the model and a data frame", "predict", call)
   }
   check_dots_named(arguments, "type = \"response\"", call)
+  arguments$type <- arguments$type %||% known$type
   structure(
     list(
-      model = model, arguments = arguments, labels = labels, package = method$package,
-      observation_space = NULL, action_space = NULL, env_id = NULL
+      model = model, predict = predict, arguments = arguments, labels = known$labels,
+      package = known$package, observation_space = NULL, action_space = NULL, env_id = NULL
     ),
     class = c("gym_policy_model", "gym_policy")
   )
 }
 
-#' Find the method of predict() for an object
-#' @return A list with the element `package`, the name of the package to load for the method; `NULL`
-#'   if there is no method.
+#' Find out how a model of a known class predicts actions
+#' @param type The user's `type` of predictions, `NULL` for the default.
+#' @return A list: `type`; `package`, which has the method of predict(); `labels`, the two levels
+#'   that a probability distinguishes, if it does. `NULL` for an unknown model.
 #' @noRd
-predict_method <- function(x) {
-  if (!is.object(x)) {
-    return(NULL)
+model_defaults <- function(model, type, call) {
+  if (inherits(model, "glm")) {
+    type <- type %||% "response"
+    labels <- binomial_levels(model, call)
+    list(type = type, labels = if (type == "response") labels)
+  } else if (inherits(model, "lm")) {
+    list(type = type)
+  } else if (inherits(model, "rpart")) {
+    default <- if (identical(model$method, "class")) "class" else "vector"
+    list(type = type %||% default, package = "rpart")
+  } else if (inherits(model, "nnet")) {
+    list(type = type %||% if (is.null(model$lev)) "raw" else "class", package = "nnet")
   }
-  if (isS4(x)) {
-    return(list(package = attr(class(x), "package")))
+}
+
+binomial_levels <- function(model, call) {
+  labels <- if (identical(model$family$family, "binomial")) {
+    levels(stats::model.frame(model)[[1L]])
   }
-  for (class in class(x)) {
-    method <- utils::getS3method("predict", class, optional = TRUE)
-    if (!is.null(method)) {
-      home <- topenv(environment(method))
-      return(list(package = if (isNamespace(home)) getNamespaceName(home)[[1L]]))
-    }
+  if (length(labels) > 2L) {
+    gym_abort(
+      c(paste0("A binomial model tells two actions apart, but its response has ", length(labels),
+               " levels."),
+        i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."),
+      class = "gym_error_argument", argument = "x", value = model, call = call
+    )
   }
+  labels
 }
 
 abort_no_model <- function(x, call) {
   gym_abort(
     c(
-      paste0("`x` must be a policy, a function of observations or a fitted model with a method of ",
-             "`predict()`, not ", describe_argument(x), "."),
-      i = if (is.object(x)) "If its method is in a package, load that first with `library()`."
+      paste0("`x` must be a policy, a function of observations or a model of `lm()`, `glm()`, ",
+             "`rpart::rpart()` or `nnet::nnet()`, not ", describe_argument(x), "."),
+      i = if (is.object(x)) {
+        "For another model, give `predict = function(model, newdata) ...`, which returns actions."
+      }
     ),
     class = "gym_error_argument", argument = "x", value = x, call = call
   )
@@ -245,7 +243,7 @@ observed_action <- function(policy, observed, call) {
 #' @noRd
 model_columns <- function(policy, observation, arg, call) {
   space <- policy$observation_space
-  if (is.data.frame(observation) && (has_formula(policy$model) || is.null(space))) {
+  if (is.data.frame(observation) && (takes_table(policy) || is.null(space))) {
     return(list(columns = as.list(narrow_values(observation)), one = FALSE))
   }
   check_was_played(policy, call)
@@ -257,8 +255,9 @@ model_columns <- function(policy, observation, arg, call) {
   list(columns = observation_columns(space, observed$batch), one = observed$one)
 }
 
-has_formula <- function(model) {
-  !is.null(tryCatch(stats::terms(model), error = function(cnd) NULL))
+takes_table <- function(policy) {
+  !is.null(policy$predict) ||
+    !is.null(tryCatch(stats::terms(policy$model), error = function(cnd) NULL))
 }
 
 check_was_played <- function(policy, call) {
@@ -282,9 +281,10 @@ model_predictions <- function(policy, columns, call) {
     return(if (width == 1) numeric() else matrix(numeric(), 0L, width))
   }
   load_model_package(policy, call)
-  newdata <- if (has_formula(policy$model)) list2DF(columns) else do.call(cbind, columns)
+  newdata <- if (takes_table(policy)) list2DF(columns) else do.call(cbind, columns)
+  predict <- policy$predict %||% stats::predict
   predicted <- tryCatch(
-    do.call(stats::predict, c(list(quote(policy$model), quote(newdata)), policy$arguments)),
+    do.call(predict, c(list(quote(policy$model), quote(newdata)), policy$arguments)),
     error = function(cnd) {
       abort_prediction(
         policy, paste("failed:", conditionMessage(cnd)),

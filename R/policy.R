@@ -131,10 +131,10 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
       class = "gym_error_argument", argument = arg, value = x, call = call
     )
   }
-  if (!inherits(x, "gym_policy") && !is.function(x) && !has_act_method(x)) {
+  if (!inherits(x, "gym_policy") && !is.function(x) && !has_method(x, "act")) {
     abort_no_policy(x, arg, call)
   }
-  if (is.function(x) && !has_act_method(x)) {
+  if (is.function(x) && !has_method(x, "act")) {
     check_takes_observations(x, arg, call)
   }
   invisible(x)
@@ -187,7 +187,7 @@ abort_no_policy <- function(x, arg, call) {
     c(
       paste0("`", arg, "` must be a policy or a function of observations, not ",
              describe_argument(x), "."),
-      i = if (!is.null(predict_method(x))) {
+      i = if (has_method(x, "predict")) {
         "`as_policy()` makes a policy of a model that predicts actions."
       } else if (!is.null(own)) {
         paste0("`.S3method(\"act\", \"", own, "\", f)` makes `f` the method by which objects of ",
@@ -198,13 +198,13 @@ abort_no_policy <- function(x, arg, call) {
   )
 }
 
-# Is there a method of `act()` for the object's own class?
-has_act_method <- function(x) {
+# Is there a method of the generic function for the object's own class?
+has_method <- function(x, generic) {
   if (!is.object(x)) {
     return(FALSE)
   }
   methods <- lapply(setdiff(.class2(x), "function"), function(class) {
-    utils::getS3method("act", class, optional = TRUE)
+    utils::getS3method(generic, class, optional = TRUE)
   })
   !all(vapply(methods, is.null, NA))
 }
@@ -251,7 +251,7 @@ act_batch <- function(policy, observation, n, vector_env) UseMethod("act_batch")
 
 #' @exportS3Method
 act_batch.default <- function(policy, observation, n, vector_env) {
-  plain <- is.function(policy) && !has_act_method(policy)
+  plain <- is.function(policy) && !has_method(policy, "act")
   actions <- if (plain) policy(observation) else act(policy, observation)
   batch_actions(actions, n, vector_env)
 }

@@ -195,6 +195,3 @@ first_action <- function(seed, step, action) if (step == 1L) 10 * action + seed 
 
 # For the argument `client`: forced only when something is about to be made.
 no_client <- function() stop("something was about to be made")
-
-# For policies that note how they are asked in a variable outside of them, which is warned of.
-while_counting <- function(code) suppressWarnings(code, classes = "gym_warning_memory")

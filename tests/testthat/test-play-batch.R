@@ -188,7 +188,7 @@ test_that("observations and actions of every shape have a row for each episode t
       seen[[length(seen) + 1L]] <<- observation
       -observation
     }
-    steps <- while_counting(rollout(env, negate, episodes = 5, seed = 1, steps = TRUE))$steps
+    steps <- rollout(env, negate, episodes = 5, seed = 1, steps = TRUE)$steps
     expect_true(all(vapply(seen, function(o) identical(dim(o)[2:3], 2:3), NA)))
     # Once more than there are steps: beforehand, about one.
     expect_identical(sum(vapply(seen, function(o) dim(o)[1], 0L)), nrow(steps) + 1L)

@@ -74,7 +74,7 @@ test_that("an interrupt leaves the batches that were finished, and the generator
     rep(0L, nrow(observation))
   }
   expect_message(
-    played <- while_counting(rollout(env, interrupting, 20, seed = 2, steps = TRUE)),
+    played <- rollout(env, interrupting, 20, seed = 2, steps = TRUE),
     "after 16 of 20 episodes", class = "gym_message_interrupted"
   )
   expect_identical(.Random.seed, state)

@@ -69,7 +69,7 @@ test_that("a function is asked about the episodes that still play", {
     rep(0L, nrow(observation))
   }
   scripted <- scripted_vector_env(3, c(1, 1, 1), c(1L, 3L, 2L))
-  while_counting(rollout(scripted, count_rows, episodes = 3))
+  rollout(scripted, count_rows, episodes = 3)
   expect_identical(utils::tail(rows, 3), 3:1)
 })
 
@@ -80,7 +80,7 @@ test_that("a row of the steps has the observation that its action was taken on",
     seen[[length(seen) + 1L]] <<- observation
     as.integer(observation[, 3] > 0)
   }
-  played <- while_counting(rollout(env, follow, episodes = 3, seed = 1, steps = TRUE))
+  played <- rollout(env, follow, episodes = 3, seed = 1, steps = TRUE)
   steps <- as.data.frame(played)
   names <- c("cart_position", "cart_velocity", "pole_angle", "pole_angular_velocity")
   expect_identical(

@@ -19,13 +19,13 @@ test_that("a rollout asks once for the actions of all sub-environments that are 
   }
   lengths <- function(seed, step, action) step == 1L + seed %% 3L
   env <- fake_vector_env(5, ends = lengths)
-  played <- while_counting(rollout(env, count, episodes = 5, seed = 1))
+  played <- rollout(env, count, episodes = 5, seed = 1)
   # First about one, to see whether it can.
   expect_identical(rows, c(1L, vapply(seq_len(max(played$episodes$length)), function(step) {
     sum(played$episodes$length >= step)
   }, 0L)))
   rows <- integer()
-  while_counting(rollout(fake_environment(), count, episodes = 2))
+  rollout(fake_environment(), count, episodes = 2)
   expect_identical(rows, rep(1L, 6))
 })
 
@@ -142,7 +142,7 @@ test_that("asking a function beforehand moves no generator and is done once a ro
   }
   asked <- 0L
   env <- fake_vector_env(2, "vector_entry_point")
-  played <- while_counting(rollout(env, draws, 6, seed = 1, steps = TRUE))
+  played <- rollout(env, draws, 6, seed = 1, steps = TRUE)
   expect_identical(asked, 3L * 3L + 1L)
   # Each batch draws from a stream of its own.
   streams <- new_streams(1)

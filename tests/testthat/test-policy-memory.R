@@ -107,52 +107,6 @@ test_that("what has no memory to keep is refused in one sentence with an example
   )
 })
 
-test_that("a function that remembers by itself is warned of once, one that does not is not", {
-  withr::defer({
-    for (name in c("total", "kept", "count")) {
-      rlang::reset_warning_verbosity(paste("gym_policy_changes", name))
-    }
-  })
-  total <- 0
-  leaks <- function(observation) {
-    total <<- total + 1
-    observation[, 1]
-  }
-  play <- function(policy) {
-    rollout(fake_vector_env(2, action_space = box), policy, episodes = 2)
-  }
-  scale <- 2
-  expect_no_warning(play(function(observation) scale * observation[, 1]))
-  expect_warning(play(leaks), "changes `total`.*policy_memory", class = "gym_warning_memory")
-  expect_no_warning(play(leaks))
-  # Another function is another mistake, also among several policies.
-  kept <- new.env()
-  expect_warning(
-    play(function(observation) kept$last <- observation[, 1]), "changes `kept`",
-    class = "gym_warning_memory"
-  )
-  count <- 0
-  counts <- function(observation) {
-    count <<- count + 1
-    observation[, 1]
-  }
-  expect_warning(play(list(summing, counts)), "changes `count`", class = "gym_warning_memory")
-})
-
-test_that("the error of a function that remembers says why", {
-  last <- 0
-  difference <- function(observation) {
-    changed <- observation[, 1] - last
-    last <<- observation[, 1]
-    changed
-  }
-  env <- fake_vector_env(3, ends = ends, action_space = box)
-  expect_error(
-    rollout(env, difference, episodes = 6, seed = 1),
-    "changes `last` from call to call.*policy_memory", class = "gym_error_argument"
-  )
-})
-
 test_that("a mistake in the function is found before the first step, with what a memory is", {
   counting <- function(initial) {
     policy_memory(function(observation, memory) {

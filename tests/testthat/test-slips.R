@@ -93,7 +93,7 @@ test_that("an error names the function that was called, not one that this calls"
     if (asked > 12) "left" else integer(length(observation))
   }
   cnd <- expect_error(
-    while_counting(evaluate_policy(corridor, failing, episodes = 300, seed = 1)),
+    evaluate_policy(corridor, failing, episodes = 300, seed = 1),
     class = "gym_error_rollout"
   )
   expect_identical(cnd$call[[1L]], quote(evaluate_policy))
