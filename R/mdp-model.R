@@ -145,7 +145,7 @@ check_is_model <- function(model, call = rlang::caller_env()) {
 }
 
 # The largest difference from 1 of the sum of a state's and action's probabilities, which may be
-# rounded. The server has the same rule.
+# rounded.
 sum_tolerance <- 1e-6
 
 check_probabilities <- function(table, call) {

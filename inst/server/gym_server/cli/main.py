@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import errno
 import logging
 import os
 import signal
@@ -21,7 +20,6 @@ from gym_server.api.watch_keys import PREFIX_VARIABLE
 from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
-from gym_server.cli.port_holder import port_holder
 from gym_server.cli.stuck import end_when_stuck
 from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
 from gym_server.cli.users import BadUsersError, make_front
@@ -30,9 +28,6 @@ from gym_server.manager.limits import Limits
 from gym_server.processes import memory, start
 
 log = logging.getLogger("gym_server")
-
-# The second is Windows' error for a port that another process has bound exclusively.
-_TAKEN = (errno.EADDRINUSE, 10013)
 
 # The environment variable by which the front (--users) says that all servers run under one account.
 SHARED_VARIABLE = "GYM_SERVER_SHARED_ACCOUNT"
@@ -157,10 +152,8 @@ def _prepare_monitor_dir(directory: Path | None) -> Path | None:
 def _why_not(error: OSError, options: argparse.Namespace) -> str:
     if error.filename is not None:
         return f"the directory {error.filename} cannot be used: {error.strerror}"
-    holder = port_holder(options.host, options.port) if error.errno in _TAKEN else None
-    reason = holder or error.strerror or error
     return (
-        f"port {options.port} on {options.host} cannot be used: {reason}; "
+        f"port {options.port} on {options.host} cannot be used: {error.strerror or error}; "
         "--port 0 picks a free port"
     )
 

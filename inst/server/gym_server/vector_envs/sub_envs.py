@@ -29,9 +29,8 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.vector_envs import group_worker
 from gym_server.vector_envs.group import Group, Outcome
-from gym_server.vector_envs.group_calls import AnyGroup, call_all
+from gym_server.vector_envs.group_calls import AnyGroup, LocalGroup, call_all
 from gym_server.vector_envs.infos import gather
-from gym_server.vector_envs.local_group import LocalGroup
 from gym_server.vector_envs.sub_env import SubEnv
 
 # How long closing may take in a process before it is killed.

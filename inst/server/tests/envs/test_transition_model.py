@@ -187,7 +187,14 @@ def test_a_table_that_leaves_something_out_is_refused(client, create):
     assert said["hint"] == "create it without fickle_passenger"
 
 
-@pytest.mark.parametrize("name", sorted(TABLES.keys() - {"sound", "of NumPy", "a number"}))
+# Tables that are sent; clients find that the probabilities do not add up to 1.
+SENT = {"sound", "of NumPy", "a number", "a list"} | {
+    "half a probability",
+    "two probabilities",
+}
+
+
+@pytest.mark.parametrize("name", sorted(TABLES.keys() - SENT))
 def test_an_unsound_table_is_refused_with_its_place(client, faulty, name):
     said = refusal(client, faulty("Table", P=name))
     beginning = "The transition table of faulty_envs:Table-v0 is invalid: "
@@ -197,15 +204,13 @@ def test_an_unsound_table_is_refused_with_its_place(client, faulty, name):
     assert "(probability, next_state, reward, terminated)" in said["hint"]
 
 
-@pytest.mark.parametrize("name", sorted(STARTS.keys() - {"sound", "a list"}))
+@pytest.mark.parametrize("name", sorted(STARTS.keys() - SENT))
 def test_an_unsound_beginning_is_refused(client, faulty, name):
     said = refusal(client, faulty("Table", start=name))
     assert "initial_state_distrib" in said["message"]
 
 
 def test_words_say_what_is_unsound(client, create, faulty):
-    said = refusal(client, faulty("Table", P="half a probability"))["message"]
-    assert said.endswith("is invalid: the probabilities in P[1][1] add up to 0.5")
     said = refusal(client, faulty("Table", P="a state beyond the last"))["message"]
     assert said.endswith("is invalid: P[1][1] holds [1.0, 2, 0.0, false]")
     said = refusal(client, faulty("Table", start="too short"))["message"]
