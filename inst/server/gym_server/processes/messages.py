@@ -7,8 +7,8 @@ import threading
 from multiprocessing.connection import Connection
 from typing import Any
 
-from gym_server.errors import GymServerError
-from gym_server.processes.pipe import MalformedMessageError, Pipe
+from gym_server.errors import GymServerError, environment_error
+from gym_server.processes.pipe import Pipe
 
 
 def read_call(raw: bytes) -> tuple[str, tuple]:
@@ -58,9 +58,8 @@ class CallPipe:
         """Wait for the result of the call.
 
         Raises:
-            GymServerError: the function's error.
+            GymServerError: the function's error, or that its result cannot be read here.
             EOFError, OSError: the process has ended.
-            MalformedMessageError: the process did not send a valid result.
         """
         try:
             raw = self._pipe.receive()
@@ -69,7 +68,7 @@ class CallPipe:
         try:
             result, refusal = pickle.loads(raw)
         except Exception as fault:
-            raise MalformedMessageError(f"a result that cannot be read: {fault}") from fault
+            raise environment_error(fault, "Reading what the environment returned") from fault
         if refusal is not None:
             error = GymServerError(*refusal)
             error.is_logged = True

@@ -9,20 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import select
 import socket
 import sys
 from multiprocessing.connection import Connection
 
 _LENGTH_BYTES = 8
 _READ_BYTES = 2**16
-
-# Longer than any valid message. The length that was sent is not used to allocate memory.
-_LONGEST = 2**31 - 1
-
-
-class MalformedMessageError(Exception):
-    """The other process did not send a valid message."""
 
 
 class ConnectionPipe:
@@ -41,13 +33,8 @@ class ConnectionPipe:
 
         Raises:
             EOFError, OSError: no process has the other end open any more.
-            MalformedMessageError: the message is invalid.
         """
-        return self._connection.recv_bytes(_LONGEST)
-
-    def poll(self, seconds: float) -> bool:
-        """Wait for a message or the end of the pipe; return whether one came."""
-        return self._connection.poll(seconds)
+        return self._connection.recv_bytes()
 
     def wake(self) -> None:
         """Make a ``receive()`` in another thread fail, even if processes have the other end open.
@@ -79,8 +66,6 @@ class SocketPipe(ConnectionPipe):
         while len(read) < _LENGTH_BYTES:
             read += self._read()
         end = _LENGTH_BYTES + int.from_bytes(read[:_LENGTH_BYTES], "little")
-        if end > _LONGEST:
-            raise MalformedMessageError("a message with an invalid length")
         if len(read) < end:
             read = self._read_until(end, read)
         self._rest = read[end:]
@@ -98,15 +83,6 @@ class SocketPipe(ConnectionPipe):
             pieces.append(self._read())
             length += len(pieces[-1])
         return b"".join(pieces)
-
-    def poll(self, seconds: float) -> bool:
-        """Wait for a message or the end of the pipe; return whether one came."""
-        if self._rest:
-            return True
-        # select() accepts only the first 1,024 file descriptors.
-        waiting = select.poll()
-        waiting.register(self._socket, select.POLLIN)
-        return bool(waiting.poll(1000 * seconds))
 
     def wake(self) -> None:
         """Make a ``receive()`` in another thread fail; see ``ConnectionPipe.wake()``."""

@@ -19,7 +19,6 @@ from typing import Any, cast
 from gym_server.errors import GymServerError, call_too_long, environment_died, shutting_down
 from gym_server.processes import start
 from gym_server.processes.messages import CallPipe
-from gym_server.processes.pipe import MalformedMessageError
 from gym_server.processes.serve import serve
 from gym_server.threads.calls import waiting
 
@@ -34,8 +33,8 @@ _EXIT_STATUS_SECONDS = 10.0
 # A ``nice`` value. A process cannot undo it.
 _LOWER_PRIORITY = 5
 
-# The errors of a call when the process has ended, or was taken over.
-_FAULTS = (EOFError, OSError, ValueError, MalformedMessageError)
+# The errors of a call when the process has ended.
+_FAULTS = (EOFError, OSError, ValueError)
 
 
 # All that have not ended.
@@ -74,7 +73,7 @@ class WorkerProcess:
         # Why the server ended it, if it did: by intention, or because a call hung.
         self._our_reason: GymServerError | None = None
         self._hung: GymServerError | None = None
-        # What was wrong with a message from it.
+        # How it ended, if it did not exit.
         self._fault = ""
         self._phase = "while it was created"
         # Until report_end(), the creation that waits for the process gets the error itself.
@@ -138,8 +137,8 @@ class WorkerProcess:
         try:
             with waiting():
                 self._calls.begin(f"{self.module}:{function}", *args)
-        except _FAULTS as fault:
-            raise self._end_after(fault) from None
+        except _FAULTS:
+            raise self._ended_by() from None
         except BaseException:
             self._since = None
             raise
@@ -149,17 +148,14 @@ class WorkerProcess:
         try:
             with waiting():
                 return self._calls.finish()
-        except _FAULTS as fault:
-            raise self._end_after(fault) from None
+        except _FAULTS:
+            raise self._ended_by() from None
         finally:
             self._since = None
 
-    def _end_after(self, fault: Exception) -> GymServerError:
+    def _ended_by(self) -> GymServerError:
         """Make sure that the process has ended; return the reason."""
-        if isinstance(fault, MalformedMessageError):
-            self._fault = f"it sent {fault}"
-            self._send_kill()
-        elif not self._ended.wait(_EXIT_STATUS_SECONDS):
+        if not self._ended.wait(_EXIT_STATUS_SECONDS):
             self._fault = "it closed its connection to the server"
             self._send_kill()
         self._ended.wait(_EXIT_SECONDS)

@@ -1,6 +1,7 @@
 """Environments that end or attack their own process do not affect others."""
 
 import os
+import select
 import signal
 import threading
 import time
@@ -90,7 +91,7 @@ def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
     process = WorkerProcess()
     process.module = "gym_server.envs.registry"
     process.begin("search", "CartPole", ())
-    eventually(lambda: process._calls._pipe.poll(0))
+    eventually(lambda: select.select([process._calls._pipe._socket], [], [], 0)[0])
     os.kill(process.pid, signal.SIGKILL)
     eventually(lambda: not process.is_alive)
     # The thread that waited for the end now closes its pipes.
