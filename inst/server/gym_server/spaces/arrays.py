@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 from typing import Any, Protocol
@@ -44,27 +45,36 @@ def read_bit(value: object) -> bool:
     return bool(value)
 
 
-def _natural(value: object) -> int:
-    number = read_integer(value)
-    if number < 0:
-        raise OverflowError("negative")
-    return number
-
-
-def _float(value: Any) -> float:
-    if isinstance(value, str) and value in NONFINITE:
-        return NONFINITE[value]
-    if not is_number(value):
-        raise TypeError("not a number")
-    return float(value)
-
-
-_READERS = {"f": _float, "i": read_integer, "u": _natural, "b": read_bit}
-
-
 def reader_of(dtype: np.dtype) -> Callable[[object], object]:
-    """Return the function that reads one array element of a dtype from JSON."""
-    return _READERS[dtype.kind]
+    """Return the function that reads one array element of a dtype from JSON.
+
+    It raises TypeError or OverflowError for what the dtype does not have.
+    """
+    if dtype.kind == "b":
+        return read_bit
+    if dtype.kind == "f":
+        largest = float(np.finfo(dtype).max)
+
+        def read_float(value: Any) -> float:
+            if isinstance(value, str) and value in NONFINITE:
+                return NONFINITE[value]
+            if not is_number(value):
+                raise TypeError("not a number")
+            number = float(value)
+            if abs(number) > largest and math.isfinite(number):
+                raise OverflowError("out of the dtype's range")
+            return number
+
+        return read_float
+    limits = np.iinfo(dtype)
+
+    def read(value: object) -> int:
+        number = read_integer(value)
+        if not limits.min <= number <= limits.max:
+            raise OverflowError("out of the dtype's range")
+        return number
+
+    return read
 
 
 def as_number(value: object) -> object:
@@ -138,78 +148,51 @@ def read_array(
         NotInSpace: the value does not fit; with the path to the first element that does not.
     """
     is_bare = space.shape == (1,) and not isinstance(value, list)
-    nested = [value] if is_bare else value
+    shape: tuple[int, ...] = ()
     try:
-        array = _array(space, read_element, nested)
-    except (TypeError, ValueError, OverflowError):
-        raise _refusal(space, read_element, value) from None
-    member = array.reshape(space.shape)
-    if bounds.hold(member):
-        return member
-    refusal = bounds.refusal(space, member)
-    if is_bare:
-        refusal.path.clear()
-    elif array.shape != space.shape:
-        # The client sent a flat list, so the path must be an index into it.
-        index: tuple[Any, ...] = tuple(refusal.path)
-        refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
-    raise refusal
+        elements = _each(
+            space, read_element, [value] if is_bare else value, max(len(space.shape), 1)
+        )
+        array = _array(elements, space.dtype)
+        shape = array.shape
+        if shape != space.shape and shape != (int(np.prod(space.shape)),):
+            raise ValueError("another shape")
+        member = array.reshape(space.shape)
+        if not bounds.hold(member):
+            raise bounds.refusal(space, member)
+    except ValueError:
+        # The lists are of different lengths, or of others than the space's.
+        raise NotInSpace(space, value) from None
+    except NotInSpace as refusal:
+        if is_bare:
+            refusal.path.clear()
+        elif shape and shape != space.shape:
+            # The client sent a flat list, so the path must be an index into it.
+            index: tuple[Any, ...] = tuple(refusal.path)
+            refusal.path[:] = [int(np.ravel_multi_index(index, space.shape))]
+        raise
+    return member
 
 
-def _array(space: ArraySpace, read_element: Callable, nested: object) -> np.ndarray:
-    elements = _each(read_element, nested, max(len(space.shape), 1))
-    to_array = _float_array if space.dtype.kind == "f" else _integer_array
-    array = to_array(elements, space.dtype)
-    if array.shape != space.shape and array.shape != (int(np.prod(space.shape)),):
-        raise ValueError("another shape")
-    return array
-
-
-def _each(read_element: Callable, value: object, depth: int) -> object:
-    if isinstance(value, list):
-        if depth == 0:
-            raise ValueError("nested too deeply")
-        return [_each(read_element, item, depth - 1) for item in value]
-    return read_element(value)
-
-
-def _float_array(numbers: object, dtype: np.dtype) -> np.ndarray:
-    doubles = np.array(numbers, dtype=np.float64)
-    with np.errstate(over="ignore", under="ignore"):
-        array = doubles.astype(dtype)
-    # Numbers outside the dtype's range must not become infinite.
-    if np.any(np.isinf(array) & np.isfinite(doubles)):
-        raise OverflowError("out of the dtype's range")
-    return array
-
-
-def _integer_array(numbers: object, dtype: np.dtype) -> np.ndarray:
-    # NumPy 1 wraps numbers outside a small dtype's range, so read into the widest first.
-    wide = np.array(numbers, dtype=np.uint64 if dtype.kind == "u" else np.int64)
-    array = wide.astype(dtype)
-    if np.any(array != wide):
-        raise OverflowError("out of the dtype's range")
-    return array
-
-
-def _refusal(space: ArraySpace, read_element: Callable, value: object) -> NotInSpace:
-    """Return the error for the first bad element, or for the whole value if none is bad."""
-    to_array = _float_array if space.dtype.kind == "f" else _integer_array
-    for path, element in _elements(value, len(space.shape), ()):
+def _each(space: object, read_element: Callable, value: object, depth: int) -> object:
+    """Read each element of nested lists."""
+    if not isinstance(value, list) or depth == 0:
         try:
-            to_array(read_element(element), space.dtype)
+            return read_element(value)
         except (TypeError, ValueError, OverflowError):
-            refusal = NotInSpace(space, element)
-            refusal.path[:] = path
-            return refusal
-    return NotInSpace(space, value)
+            raise NotInSpace(space, value) from None
+    items = []
+    for index, item in enumerate(value):
+        try:
+            items.append(_each(space, read_element, item, depth - 1))
+        except NotInSpace as refusal:
+            refusal.path.insert(0, index)
+            raise
+    return items
 
 
-def _elements(
-    value: object, depth: int, path: tuple[int, ...]
-) -> Iterator[tuple[tuple[int, ...], object]]:
-    if isinstance(value, list) and depth > 0:
-        for index, item in enumerate(value):
-            yield from _elements(item, depth - 1, (*path, index))
-    else:
-        yield path, value
+def _array(elements: object, dtype: np.dtype) -> np.ndarray:
+    if dtype.kind != "f":
+        return np.array(elements, dtype=dtype)
+    with np.errstate(under="ignore"):
+        return np.array(elements, dtype=np.float64).astype(dtype)
