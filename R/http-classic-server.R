@@ -1,8 +1,12 @@
 # Servers with only the protocol of gym-http-api, such as the original one. They say less about an
 # environment, ignore unknown fields, and execute a repeated request twice.
 
-# A newer server repeats the idempotency key in its answer. `answer` is the answer to a creation.
-note_protocol <- function(state, answer) state$classic <- is.null(answer$request)
+# A newer server repeats the idempotency key in its answer, and says by a text which server it is.
+# `answer` is the answer to a creation.
+note_protocol <- function(state, answer) {
+  state$classic <- is.null(answer$request)
+  state$server <- string_or_null(answer$server)
+}
 
 #' Describe an instance from the data of the classic protocol
 #'

@@ -18,6 +18,7 @@ client_state <- function(client) {
       state$session_config <- getOption("httr_config")
       state$instances <- new.env(parent = emptyenv())
       state$creation_keys <- new_idempotency_keys()
+      state$server <- NULL
       state$to_close <- character()
       state$health <- NULL
       state$line <- NULL

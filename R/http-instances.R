@@ -15,13 +15,26 @@ closing_time <- 2
 #' 3. `outcome` is still "lost": the request is queued for closing, see [end_creation()].
 #' 4. When the next instance is created or reset, when instances are listed, or at the end of the
 #' session, the request is repeated. The server does not create another instance; it answers with
-#' the id, and the instance is closed.
+#' the id, and the instance is closed. If it has ended since, another server refuses the request.
 #' @return The answer, with a checked id.
 #' @noRd
 create_on_server <- function(client, fields, call) {
   state <- client_state(client)
+  tryCatch(
+    create_once(client, state, fields, call),
+    gym_error_http = function(cnd) {
+      if (!identical(cnd$code, "server_restarted")) rlang::cnd_signal(cnd)
+      # Another server listens at the address now. It has created nothing.
+      state$server <- NULL
+      create_once(client, state, fields, call)
+    }
+  )
+}
+
+create_once <- function(client, state, fields, call) {
   request <- prepare_request(client, "/v1/envs/", fields = fields, once = TRUE)
-  key <- next_key(state$creation_keys)
+  # A server that was started later must not create what an earlier one was asked for.
+  key <- c(next_key(state$creation_keys), server = state$server)
   place <- paste(key$key, key$number)
   outcome <- "lost"
   on.exit(end_creation(state, place, outcome))

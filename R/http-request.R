@@ -35,7 +35,8 @@ prepare_request <- function(client, route, method = "POST", fields = NULL,
 #' whose connection broke is made again with the same idempotency key.
 #' @param request From [prepare_request()].
 #' @param content The other content of this body, besides the request's fields.
-#' @param key The idempotency key, a list of `key` and `number`; by default the connection's next.
+#' @param key The idempotency key, a list of `key`, `number` and perhaps `server`, the server that
+#'   it is for; by default the connection's next.
 #' @return The result of `read` or `result` of the request.
 #' @noRd
 perform_request <- function(request, content = NULL, call = rlang::caller_env(), key = NULL) {
@@ -145,7 +146,10 @@ new_json_body <- function(fields) {
       return(charToRaw(json_object(fields)))
     }
     if (!identical(of_key, key$key)) {
-      ending <<- paste0(json_members(fields), '"request":{"key":"', key$key, '","number":')
+      server <- if (!is.null(key$server)) paste0('"server":', to_json(key$server), ",")
+      ending <<- paste0(
+        json_members(fields), '"request":{"key":"', key$key, '",', server, '"number":'
+      )
       of_key <<- key$key
     }
     bytes <- charToRaw(paste0("{", content, ending, sprintf("%.0f}}", key$number)))

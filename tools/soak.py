@@ -95,11 +95,8 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
-        "unread": python("unread", 4050, 20 if quick else 60),
-        "bodies": python("bodies", 2 if quick else 10),
         "memory": python("guests", "memory", 2 if quick else 20),
         "processes": python("guests", "processes", 1 if quick else 5),
-        "keys": python("keys", 4_000 if quick else 40_000),
         "os-exit": pytest("tests/processes/test_worker_process.py"),
         "drawing": pytest("tests/test_drawing.py", GYM_TEST_DRAWING="all"),
         "environments": pytest(

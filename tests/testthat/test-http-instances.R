@@ -196,3 +196,23 @@ test_that("an error in a search closes its environment without waiting for a ser
   close_session()
   expect_length(open_after_a_while(server), 0)
 })
+
+test_that("a client goes on with a server that was started later at its address", {
+  skip_unless_all()
+  first <- local_server(token = FALSE)
+  client <- create_GymClient(first$remote_base)
+  expect_type(env_create(client, "CartPole-v1"), "character")
+  known <- client_state(client)$server
+  port <- as.integer(sub(".*:", "", first$remote_base))
+  gym_server_stop(first)
+  later <- local_server(port = port, token = FALSE)
+  id <- env_create(client, "CartPole-v1")
+  expect_named(env_list_all(later), id)
+  expect_false(identical(client_state(client)$server, known))
+  # What the first one was asked for is not made again.
+  fields <- c(env_id = "\"CartPole-v1\"")
+  request <- prepare_request(client, "/v1/envs/", fields = fields, once = TRUE)
+  key <- list(key = "k", number = 1, server = known)
+  expect_error(perform_request(request, key = key), class = "gym_error_http_410")
+  expect_named(env_list_all(later), id)
+})

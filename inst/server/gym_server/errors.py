@@ -21,11 +21,11 @@ _STATUS = {
     "request_conflict": 409,
     "instance_idle_closed": 410,
     "instance_memory_closed": 410,
+    "server_restarted": 410,
     "upload_closed": 410,
     "body_too_large": 413,
     "upgrade_required": 426,
     "too_many_instances": 429,
-    "too_many_keys": 429,
     "too_many_rollouts": 429,
     "too_many_sub_envs": 429,
     "too_many_processes": 429,
@@ -33,14 +33,11 @@ _STATUS = {
     "environment_died": 500,
     "environment_error": 500,
     "internal_error": 500,
-    "busy_receiving": 503,
     "shutting_down": 503,
     "call_too_long": 504,
 }
 
 _HEADERS = {
-    "busy_receiving": (("Retry-After", "5"),),
-    "too_many_keys": (("Retry-After", "60"),),
     "too_many_rollouts": (("Retry-After", "1"),),
     "upgrade_required": (("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")),
     "unauthorized": (("WWW-Authenticate", 'Bearer realm="gym_server"'),),
@@ -207,15 +204,6 @@ def body_too_large() -> GymServerError:
         "body_too_large",
         "The request's body is larger than this server accepts",
         "send less at a time",
-    )
-
-
-def busy_receiving() -> GymServerError:
-    """Report that so many large bodies are arriving that there is no memory for another."""
-    return GymServerError(
-        "busy_receiving",
-        "This server is receiving as many large requests as it has memory for",
-        "send it again in a few seconds",
     )
 
 

@@ -1,4 +1,4 @@
-"""A response, as it is sent, and stored in case its request is repeated."""
+"""What the application tells the HTTP server."""
 
 from __future__ import annotations
 
@@ -28,3 +28,18 @@ class Response(NamedTuple):
     content_type: str = JSON
     headers: tuple[tuple[str, str], ...] = ()
     take_over: Callable[[socket.socket, bytes], None] | None = None
+
+
+class Admission(NamedTuple):
+    """How a request is answered whose head has arrived.
+
+    Attributes:
+        respond: answers the request, given its body and a function that returns whether the client
+            still waits; never raises.
+        is_known: whether the client may stay connected; others have little time.
+        lasts: whether it also holds for later requests with the same head on the connection.
+    """
+
+    respond: Callable[[bytes, Callable[[], bool]], Response]
+    is_known: bool = True
+    lasts: bool = True

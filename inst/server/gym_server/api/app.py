@@ -6,8 +6,10 @@ dispatch takes longer than many steps, so requests with a route bypass it.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import flask
@@ -19,10 +21,10 @@ from gym_server.api.endpoint import Endpoint
 from gym_server.api.exactly_once import ExactlyOnce
 from gym_server.api.failures import failure
 from gym_server.api.open_streams import OpenStreams
-from gym_server.api.routes import BLUEPRINTS, ROUTES
+from gym_server.api.routes import BLUEPRINTS
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
-from gym_server.errors import GymServerError, body_too_large, busy_receiving, malformed_request
+from gym_server.errors import GymServerError, body_too_large, malformed_request
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
@@ -31,7 +33,7 @@ from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.processes.pool import pool
 from gym_server.processes.set_up import OWN_MB
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.response import Response
+from gym_server.response import Admission, Response
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class GymApp(Flask):
         self._rollouts = Rollouts(config.limits.rollout_processes)
         self._exactly_once = ExactlyOnce(self._instances.lives)
         self._router = Router(self, BLUEPRINTS)
-        services = Services(
+        self._max_body_bytes = config.max_body_bytes
+        self._services = Services(
             self._instances,
             self._rollouts,
             self._monitor_root,
@@ -88,54 +91,52 @@ class GymApp(Flask):
             OpenStreams(self._exactly_once, config.max_body_bytes),
             watch_keys if config.access.token is not None else None,
         )
-        self._endpoints = {
-            route: Endpoint(route, services, self._exactly_once, config.max_body_bytes)
-            for route in ROUTES
-        }
         self.register_error_handler(Exception, lambda error: _for_flask(failure(error)))
         self._watchdog = Watchdog(self._instances, self._rollouts, config.limits)
 
-    def respond(self, environ: dict) -> Response:
-        """Answer a request, given as a WSGI environ."""
+    def admit(self, environ: dict) -> Admission | Response:
+        """Say how to answer a request before its body is read, or refuse it.
+
+        Args:
+            environ: the request's head, as a WSGI environ.
+        """
         match = self._router.match(environ)
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
             return _refused(refusal, environ, match)
-        if match is not None:
-            return self._endpoints[match.route].respond(environ, match)
-        # 404, 405, or a redirect if the path has too many slashes.
-        with self.request_context(environ):
+        if match is None:
+            return Admission(partial(self._without_route, environ))
+        endpoint = Endpoint(environ, match, self._services, self._exactly_once)
+        has_token = self._guard.has_token(environ)
+        is_known = has_token or match.callers is Callers.WATCHERS
+        return Admission(endpoint.respond, is_known, lasts=has_token)
+
+    def _without_route(self, environ: dict, body: bytes, _: Callable[[], bool]) -> Response:
+        """Answer 404, 405, or a redirect if the path has too many slashes."""
+        with self.request_context({**environ, "wsgi.input": io.BytesIO(body)}):
             found = self.full_dispatch_request()
         others = [(name, value) for name, value in found.headers if not name.startswith("Content-")]
         return Response(found.status_code, found.data, found.content_type or "", tuple(others))
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
         """Answer a request by WSGI, for Flask's test client."""
-        response = _for_flask(self.respond(environ))
-        return response(environ, start_response)
-
-    def admit(self, environ: dict) -> Response | None:
-        """Return a response that refuses a request before its body is read; None to read it."""
-        try:
-            self._guard.check(environ, self._router.match(environ))
-        except GymServerError as refusal:
-            return failure(refusal)
-        return None
-
-    def recognizes(self, environ: dict) -> bool:
-        """Return whether a request comes from a client that may use this server."""
-        return self._guard.recognizes(environ, self._router.match(environ))
+        length = int(environ.get("CONTENT_LENGTH") or 0)
+        answer = self.admit({"CONTENT_TYPE": "", **environ})
+        if length > self._max_body_bytes:
+            answer = self.refuse(413, "")
+        if isinstance(answer, Admission):
+            answer = answer.respond(environ["wsgi.input"].read(length), lambda: True)
+        return _for_flask(answer)(environ, start_response)
 
     def refuse(self, status: int, reason: str) -> Response:
         """Return the response to a request that does not reach the application.
 
         Args:
-            status: 400, 413 or 503.
+            status: 400 or 413.
             reason: what is wrong with the request, for 400.
         """
-        refusals = {413: body_too_large, 503: busy_receiving}
-        return failure(refusals[status]() if status in refusals else malformed_request(reason))
+        return failure(body_too_large() if status == 413 else malformed_request(reason))
 
     def begin_stop(self) -> None:
         """Answer clients that would otherwise wait for longer than the stop may take."""

@@ -15,9 +15,6 @@ from gym_server.manager.rollouts import Rollouts
 from gym_server.monitoring.monitor_directory import MonitorRoot
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
 
-# The key in the WSGI environ for a function that returns whether the client still waits.
-IS_CONNECTED = "gym_server.is_connected"
-
 
 @dataclass(frozen=True)
 class Services:

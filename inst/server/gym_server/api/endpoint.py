@@ -2,128 +2,126 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header
 from werkzeug.wrappers import Request
 
-from gym_server.api.calls import IS_CONNECTED, Call, Services
-from gym_server.api.exactly_once import ExactlyOnce, Outcome, kept_body
+from gym_server.api.calls import Call, Services
+from gym_server.api.exactly_once import ExactlyOnce, kept_body
 from gym_server.api.failures import failure
-from gym_server.api.routing import Match, Route
-from gym_server.errors import GymServerError, body_too_large
+from gym_server.api.routing import Match
+from gym_server.errors import GymServerError
 from gym_server.protocol import bodies
 from gym_server.protocol.answers import JSON_FORM, AnswerForm, response_to
 from gym_server.protocol.fields import REQUEST, RequestId, read
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
-from gym_server.response import JSON, Response
-
-
-def _always() -> bool:
-    return True
+from gym_server.response import Response
 
 
 class Endpoint:
-    """Answers the requests to one route."""
+    """Answers the requests with one head."""
 
     def __init__(
-        self, route: Route, services: Services, exactly_once: ExactlyOnce, max_body_bytes: int
+        self, environ: dict, match: Match, services: Services, exactly_once: ExactlyOnce
     ) -> None:
         """Prepare to answer.
 
         Args:
-            route: the route.
-            services: the services for its handler.
+            environ: the head, as a WSGI environ.
+            match: its route and path.
+            services: the services for the route's handler.
             exactly_once: the responses to requests with an idempotency key.
-            max_body_bytes: the size of the largest body.
         """
-        self._route = route
+        self._route = route = match.route
+        self._environ = environ
+        self._match = match
         self._services = services
         self._exactly_once = exactly_once
-        self._max_body_bytes = max_body_bytes
         # Read the idempotency key first, because errors in other fields echo it.
         self._fields = (REQUEST, *route.fields) if route.once else route.fields
+        self._is_tensors = route.tensor_body is not None and TENSORS in environ["CONTENT_TYPE"]
+        self._read: Callable[[bytes], dict] = bodies.loads
+        if route.method == "GET":
+            self._read = partial(_query, environ)
+        elif self._is_tensors and route.tensor_body is not None:
+            self._read = route.tensor_body
+        self._accept = environ.get("HTTP_ACCEPT", "")
+        self._form = JSON_FORM
+        if route.tensors:
+            self._form = _wanted_form(self._accept, route.content_type)
+        # Requests that end an instance are stored with those that create one: the instance's own
+        # end with it.
+        self._used_id = None if route.ends_instance else match.variables.get("instance_id")
 
-    def respond(self, environ: dict, match: Match) -> Response:
+    def respond(self, raw: bytes, is_connected: Callable[[], bool]) -> Response:
         """Answer a request; never raise.
 
         Args:
-            environ: the request, as a WSGI environ.
-            match: its route and path.
+            raw: its body.
+            is_connected: returns whether the client still waits for the response.
         """
-        route = self._route
         fields: dict = {}
         try:
-            length = int(environ.get("CONTENT_LENGTH") or 0)
-            if length > self._max_body_bytes:
-                raise body_too_large()
-            raw = environ["wsgi.input"].read(length)
-            tensors = route.tensor_body if TENSORS in environ.get("CONTENT_TYPE", "") else None
-            body = _query(environ) if route.method == "GET" else (tensors or bodies.loads)(raw)
+            body = self._read(raw)
             read(body, self._fields, fields)
             request_id = fields.pop("request", None)
         except Exception as error:
             return failure(error, fields.get("request"))
-        accept = environ.get("HTTP_ACCEPT", "")
+        path, form = self._match.path, self._form
         call = Call(
             self._services,
-            match.variables,
+            self._match.variables,
             body,
             fields,
-            (_FORMS.get(accept) or _wanted_form(accept, route.content_type))
-            if route.tensors
-            else JSON_FORM,
-            match.path,
-            accept,
-            environ.get(IS_CONNECTED, _always),
-            environ,
+            form,
+            path,
+            self._accept,
+            is_connected,
+            self._environ,
         )
         if request_id is None:
-            return self._perform(call, None).response
-        # Requests that end an instance are stored with those that create one, so that they are
-        # never refused because the instance has too many keys.
-        used_id = None if route.ends_instance else match.variables.get("instance_id")
+            return self._perform(call, None)[0]
         asked = kept_body(raw)
-        content = (match.path, asked, tensors is not None, call.form)
-        perform = partial(self._perform, call, request_id)
+        content = path, asked, self._is_tensors, form
         try:
-            return self._exactly_once.respond(request_id, used_id, content, len(asked), perform)
+            return self._exactly_once.respond(
+                request_id,
+                self._used_id,
+                content,
+                len(asked),
+                partial(self._perform, call, request_id),
+            )
         except Exception as error:
             return failure(error, request_id)
 
-    def _perform(self, call: Call, request_id: RequestId | None) -> Outcome:
-        route, instance_id = self._route, call.path.get("instance_id")
+    def _perform(self, call: Call, request_id: RequestId | None) -> tuple[Response, bool]:
+        """Return the response, and whether doing it again could make a difference."""
         try:
-            if route.grows:
+            if self._route.grows:
                 self._services.instances.account.check()
-            result = route.handler(call)
-            if instance_id is None and isinstance(result, dict):
-                instance_id = result.get("instance_id")
-            return Outcome(response_to(result, request_id), True, instance_id)
+            response = response_to(self._route.handler(call), request_id)
+            if self._used_id is None and self._route.once:
+                self._exactly_once.forget_closed()
+            return response, True
         except BaseException as error:
             # Even SystemExit and the like, which environments may raise, become a response to
             # store.
             did_nothing = isinstance(error, GymServerError) and error.did_nothing
-            return Outcome(failure(error, request_id), not did_nothing, instance_id)
+            return failure(error, request_id), not did_nothing
 
 
-def _query(environ: dict) -> dict[str, str | list[str]]:
+def _query(environ: dict, raw: bytes) -> dict[str, str | list[str]]:
     """Return a query's fields; a repeated one becomes a list, which no field accepts."""
     lists = Request(environ).args.lists()
     return {name: values[0] if len(values) == 1 else values for name, values in lists}
 
 
-_ROWS = AnswerForm(tensors=True)
-_COLUMNS = AnswerForm(tensors=True, by_column=True)
-
-# Most clients send one of these; the R client sends the last one. Parsing the header takes as long
-# as many steps.
 _FORMS = {
-    JSON: JSON_FORM,
-    TENSORS: _ROWS,
-    COLUMN_TENSORS: _COLUMNS,
-    f"{COLUMN_TENSORS}, {TENSORS};q=0.9": _COLUMNS,
+    TENSORS: AnswerForm(tensors=True),
+    COLUMN_TENSORS: AnswerForm(tensors=True, by_column=True),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gym_server.api import env_fields
 from gym_server.api.calls import Call
+from gym_server.api.exactly_once import START
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.instances.about import about
@@ -35,7 +36,7 @@ bp = RouteBlueprint("envs")
 def env_create(call: Call) -> dict:
     """Create an environment."""
     fields = {**call.fields, "wrappers": call.fields["wrappers"] or ()}
-    return about(call.services.instances.create(EnvConfig(**fields)))
+    return {**about(call.services.instances.create(EnvConfig(**fields))), "server": START}
 
 
 @bp.declare("GET", "/v1/envs/")

@@ -20,10 +20,6 @@ _HEX_DIGITS = frozenset("0123456789abcdef")
 
 Handler = Callable[..., dict | Response | None]
 
-# How many routes of recent requests are remembered, and the longest path.
-_MOST_KNOWN = 4096
-_LONGEST_KNOWN = 100
-
 
 class Callers(Enum):
     """Who may call a route on a server with a token."""
@@ -118,7 +114,7 @@ class Match(NamedTuple):
 
 
 class Router:
-    """Finds the route of each request in Flask's map, which takes 10 us, and remembers it."""
+    """Finds the route of each request in Flask's map."""
 
     def __init__(self, app: Flask, blueprints: Iterable[RouteBlueprint]) -> None:
         """Register the blueprints with the application."""
@@ -127,28 +123,16 @@ class Router:
             app.register_blueprint(blueprint)
             self._routes |= blueprint.routes
         self._urls = app.url_map.bind("")
-        # By method and path.
-        self._known: dict[tuple[str, str], Match] = {}
 
     def match(self, environ: dict) -> Match | None:
         """Return the route of a request, given as a WSGI environ; None if there is none."""
-        key = environ["REQUEST_METHOD"], environ["PATH_INFO"]
-        match = self._known.get(key)
-        if match is None:
-            match = self._find(*key)
-            if match is not None and len(match.path) <= _LONGEST_KNOWN:
-                if len(self._known) >= _MOST_KNOWN:
-                    self._known.clear()
-                self._known[key] = match
-        return match
-
-    def _find(self, method: str, path: str) -> Match | None:
+        path = environ["PATH_INFO"]
         if not path.isascii():
             path = path.encode("latin-1").decode("utf-8", "replace")
         # A client may append the path to an address that ends with a slash.
         path = "/" + path.lstrip("/")
         try:
-            name, variables = self._urls.match(path, method)
+            name, variables = self._urls.match(path, environ["REQUEST_METHOD"])
         except HTTPException:
             return None
         return Match(self._routes[name], dict(variables), path)

@@ -10,6 +10,7 @@ import numpy
 
 from gym_server import __version__
 from gym_server.api.calls import Call
+from gym_server.api.exactly_once import START
 from gym_server.api.routing import RouteBlueprint
 from gym_server.errors import GymServerError
 from gym_server.protocol.answers import HTML
@@ -66,4 +67,5 @@ def health(call: Call) -> dict:
         },
         "pid": os.getpid(),
         "rollouts": True,
+        "server": START,
     }

@@ -15,7 +15,7 @@ import numpy as np
 
 from gym_server.api import env_routes
 from gym_server.api.calls import Call
-from gym_server.api.exactly_once import Outcome, kept_body
+from gym_server.api.exactly_once import kept_body
 from gym_server.api.failures import failure
 from gym_server.api.stream_layout import (
     ANSWER_HEAD,
@@ -119,7 +119,9 @@ class Stream:
         form = JSON_BODY if response.content_type == JSON else TENSOR_BODY
         return ANSWER_HEAD.pack(form, response.status, 0, number) + response.body
 
-    def _perform(self, what: int, form: int, flags: int, number: float, data: bytes) -> Outcome:
+    def _perform(
+        self, what: int, form: int, flags: int, number: float, data: bytes
+    ) -> tuple[Response, bool]:
         try:
             if what not in _ROUTES or form not in (ARRAYS, JSON_BODY, TENSOR_BODY):
                 raise malformed_message(f"there is no request {what} in form {form}")
@@ -129,14 +131,14 @@ class Stream:
                 result = self._request(what, form, flags, data)
             arrays = self._layout.arrays(result)
             if arrays is None:
-                return Outcome(response_to(result, None), True, self._instance_id)
+                return response_to(result, None), True
             info = dumps({"info": result["info"]}) if result["info"] else b""
             head = ANSWER_HEAD.pack(ARRAYS, 200, len(info), number)
-            return Outcome(Response(200, head + arrays + info, MESSAGE), True, self._instance_id)
+            return Response(200, head + arrays + info, MESSAGE), True
         except BaseException as error:
             # Even SystemExit and the like, which environments may raise.
             did_nothing = isinstance(error, GymServerError) and error.did_nothing
-            return Outcome(failure(error), not did_nothing, self._instance_id)
+            return failure(error), not did_nothing
 
     def _step(self, flags: int, data: bytes) -> dict:
         """Take the step of a message of arrays."""

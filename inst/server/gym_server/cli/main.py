@@ -17,7 +17,6 @@ from gym_server import logs
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
 from gym_server.api.watch_keys import PREFIX_VARIABLE
-from gym_server.budget import Budget
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.stuck import end_when_stuck
@@ -31,10 +30,6 @@ log = logging.getLogger("gym_server")
 
 # The environment variable by which the front (--users) says that all servers run under one account.
 SHARED_VARIABLE = "GYM_SERVER_SHARED_ACCOUNT"
-
-# How many of the largest bodies may arrive at a time. Of smaller bodies there may be more, and
-# small ones do not count.
-_LARGEST_BODIES = 16
 
 # How long requests in progress may take after a stop. A step may never return.
 _GRACE_SECONDS = 10.0
@@ -93,8 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             watch_prefix=os.environ.pop(PREFIX_VARIABLE, ""),
         )
     )
-    budget = Budget(_LARGEST_BODIES * Config.max_body_bytes)
-    server = Server(app, listener, Config.max_body_bytes, budget)
+    server = Server(app, listener, Config.max_body_bytes)
     stop.server = server
     _begin(options, server.port, stop)
     _serve(app, server)

@@ -16,10 +16,11 @@ Why it exists:
 
 - A stop loses no response: ``Server.run()`` answers all requests that have arrived before it
   returns.
-- Clients that do not read, that send byte by byte, or that open thousands of connections do not
-  lock anybody out.
+- A response may take over the socket, to speak another protocol.
 
-What it does not support: TLS, HTTP/2, WebSockets, compression, files, chunked responses (a response
-is sent when it is complete), several processes. Put a reverse proxy in front of it for those. It
-uses one thread per connection.
+It serves people who trust each other: who is known to the application may use a connection, which
+has a thread of its own, as slowly as they like. Others have 20 seconds, and make room for new ones.
+
+What it does not support: TLS, HTTP/2, compression, files, chunked responses (a response is sent
+when it is complete), several processes. Put a reverse proxy in front of it for those.
 """

@@ -4,88 +4,83 @@ from __future__ import annotations
 
 import contextlib
 import email.utils
-import io
-import os
+import math
+import re
 import socket
-import struct
 import time
+from collections.abc import Callable
+from enum import Enum
 from functools import lru_cache
 from http import HTTPStatus
+from typing import NamedTuple
 
 from httptools import HttpParserError
 
-from gym_server.budget import Share
+from gym_server.http_server.head import MOST_BYTES, RequestHead
 from gym_server.http_server.interface import Application
-from gym_server.http_server.request_parser import Request, RequestParser
-from gym_server.response import Response
+from gym_server.response import Admission, Response
 
-# The longest that a connection may be idle, in seconds.
+# How long a client may use the connection before it is known, in seconds, whatever it does. Longer
+# than the proxy of inst/examples/nginx.conf keeps an idle connection.
+_UNKNOWN_SECONDS = 20.0
+
+# How long a known client may be silent, or take to read a response, in seconds.
 _IDLE_SECONDS = 3600.0
 
-# A client may pause this long, in seconds, while it sends a request or reads a response. Overall it
-# must move at least this many bytes a second.
-_REST_SECONDS = 60.0
-_SLOWEST_BYTES = 1000
-
-# How long a client that is not recognized may use the connection, in seconds, whatever it does.
-# Longer than the proxy of inst/examples/nginx.conf keeps an idle connection.
-_UNRECOGNIZED_SECONDS = 20.0
-
-# When a response has been unread for this long, the client is slow and not the network.
-_UNREAD_SECONDS = 1.0
-
-# The header of responses that need not be delivered after the server has stopped.
-_NO_STORE = ("Cache-Control", "no-store")
+# How much a client may still send after a refusal, so that it sees the response, and how long it
+# may pause.
+_DISCARD_BYTES = 2**30
+_DISCARD_SECONDS = 5.0
 
 _RECEIVE_BYTES = 2**16
 
 # Bodies up to this size are copied behind their head, to send both in one piece.
 _COPIED_BYTES = 2**16
 
-# How much of a response the system buffers beyond what is in flight. It takes more when half of
-# that is gone, so even the slowest reader allowed is seen to read within half a minute.
-_UNSENT_BYTES = 2**16
+# A client that plays sends the same few heads again and again. This many of at most this size are
+# remembered.
+_MOST_HEADS = 16
+_LONGEST_HEAD = 4096
 
-# With this option, closing a socket discards unread data instead of keeping it for minutes.
-_DISCARD_UNREAD = struct.pack("hh" if os.name == "nt" else "ii", 1, 0)
+_CHUNK_SIZE = re.compile(rb"([0-9A-Fa-f]{1,15})(?:;.*)?\r\n")
+_MOST_TRAILERS = 100
 
 
-class _Pace:
-    """How long to wait for the next part of a request or response.
+class _Phase(Enum):
+    """What a connection does: wait for a request, receive its rest, answer it, or serve a route."""
 
-    A client that sends or reads byte by byte is treated like one that does nothing.
-    """
+    IDLE = 1
+    RECEIVING = 2
+    ANSWERING = 3
+    TAKEN_OVER = 4
 
-    def __init__(self) -> None:
-        """Start the clock."""
-        self._due = time.monotonic() + _REST_SECONDS
 
-    def left(self, moved: int) -> float:
-        """Return how many seconds the next part may take.
+class _Known(NamedTuple):
+    """A head that was read and admitted."""
 
-        Args:
-            moved: the bytes sent or received since the last call.
+    head: RequestHead
+    admission: Admission
 
-        Raises:
-            TimeoutError: the client is too slow.
-        """
-        self._due += moved / _SLOWEST_BYTES
-        left = min(_REST_SECONDS, self._due - time.monotonic())
-        if left <= 0:
-            raise TimeoutError("a request comes, or an answer is read, too slowly")
-        return left
+
+class _RefusedError(Exception):
+    """Ends the connection with a response."""
+
+    def __init__(self, response: Response, with_body: bool = True) -> None:
+        super().__init__()
+        self.response = response
+        self.with_body = with_body
 
 
 class Connection:
-    """Serves the requests of one socket, one after another."""
+    """Serves the requests of one socket, one after another.
+
+    Attributes:
+        is_known: whether its client has shown that it may stay connected.
+        heard: when it was opened or its last request began, in the clock's seconds.
+    """
 
     def __init__(
-        self,
-        client: socket.socket,
-        app: Application,
-        base_environ: dict,
-        max_body_bytes: int,
-        bodies: Share,
+        self, client: socket.socket, app: Application, base_environ: dict, max_body_bytes: int
     ) -> None:
         """Take over a connected socket.
 
@@ -94,160 +89,153 @@ class Connection:
             app: the application.
             base_environ: the entries that the environ of every request shares.
             max_body_bytes: the size of the largest body.
-            bodies: the memory that large bodies hold until they are answered.
         """
         self._socket = client
         self._app = app
         self._base_environ = base_environ
-        self._parser = RequestParser(max_body_bytes, self._send, self._refusal, bodies, app.refuse)
-        self._is_recognized = False
-        # The deadline for being recognized, in the clock's seconds.
-        self._due = time.monotonic() + _UNRECOGNIZED_SECONDS
-        self._last: Request | None = None
-        self._last_environ: dict = {}
+        self._max_body_bytes = max_body_bytes
+        self._heads: dict[bytes, _Known] = {}
+        # What was received, and how much of it was read.
+        self._data = b""
+        self._at = 0
+        self._phase = _Phase.IDLE
         self._stopping = False
-        # Whether it is working on a request rather than waiting for its client.
-        self._busy = False
-        # The size of the response that is being sent, as the only item of a list. Two threads may
-        # call list.pop(): the serving thread when everything is sent, and the thread that evicts
-        # this connection because the response is not read. It succeeds in only one of them.
-        self._sending: list[int] = []
-        # Whether the response being sent need not be delivered after a stop.
-        self._sends_no_store = False
-        # Since when it has been waiting for its client, in the clock's seconds.
-        self.waiting_since = time.monotonic()
-
-    @property
-    def unsent_bytes(self) -> int:
-        """The size of the response that its client has not yet read."""
-        return sum(self._sending)
-
-    def _wait_at_most(self, seconds: float) -> None:
-        """Set how long the socket may take to send or receive the next part."""
-        if not self._is_recognized:
-            seconds = min(seconds, self._due - time.monotonic())
-            if seconds <= 0:
-                raise TimeoutError("a client that is not recognized has no more time")
-        self._socket.settimeout(seconds)
+        self.is_known = False
+        self.heard = time.monotonic()
+        self._due = self.heard + _UNKNOWN_SECONDS
 
     def serve(self) -> None:
         """Answer requests until the client leaves, is silent for too long, or the server stops."""
         # A client that has left needs no response, so socket errors are ignored.
-        with contextlib.suppress(OSError), contextlib.closing(self._parser), self._socket:
+        with contextlib.suppress(OSError), self._socket:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
-            self._wait_at_most(_REST_SECONDS)
-            rest: _Pace | None = None
-            while data := self._receive():
-                self._busy = True
-                requests = self._parser.feed(data)
-                if not all(map(self._answer, requests)):
-                    break
-                if not requests:
-                    self.waiting_since = time.monotonic()
-                self._busy = False
-                if not self._parser.began:
-                    # For a recognized client the timeout is already set.
-                    if rest is not None or not self._is_recognized:
-                        self._wait_at_most(_REST_SECONDS)
-                    rest = None
-                    continue
-                if requests or rest is None:
-                    rest = _Pace()
-                self._wait_at_most(rest.left(len(data)))
-
-    def _receive(self) -> bytes:
-        while True:
             try:
-                return self._socket.recv(_RECEIVE_BYTES)
-            except TimeoutError:
-                silent = time.monotonic() - self.waiting_since
-                if self._parser.began or not self._is_recognized or silent > _IDLE_SECONDS:
-                    raise
+                while self._answer_next():
+                    pass
+            except _RefusedError as refusal:
+                self._send(refusal.response, False, refusal.with_body)
+                self._discard()
 
-    def _refusal(self, request: Request) -> Response | None:
-        """Return a response that refuses a request before its large body arrives, or None."""
-        try:
-            environ = {**self._base_environ, **request.environ()}
-        except HttpParserError as error:
-            return self._app.refuse(400, str(error))
-        refusal = self._app.admit(environ)
-        if refusal is None and not self._is_recognized:
-            self._recognize(environ)
-        return refusal
-
-    def _recognize(self, environ: dict) -> None:
-        if self._app.recognizes(environ):
-            self._is_recognized = True
-            self._wait_at_most(_REST_SECONDS)
-
-    def _answer(self, request: Request) -> bool:
+    def _answer_next(self) -> bool:
         """Answer one request; return whether another may follow."""
-        response = self._respond(request)
-        if request.held_bytes:
-            self._parser.release(request)
-        keep = request.keep_alive and self._is_recognized and not self._stopping
-        # The connection may be one that a proxy shares among clients with servers of their own.
-        keep = keep and response.status != HTTPStatus.UNAUTHORIZED
-        self._sends_no_store = _NO_STORE in response.headers
-        head, body = _head(response, keep), b"" if request.method == "HEAD" else response.body
-        # One send() where the copy is cheap: a second one would arrive later.
-        if len(body) <= _COPIED_BYTES:
-            self._send(head + body)
-        else:
-            self._send(head, body)
-        self._sends_no_store = False
+        raw = self._read_head()
+        known = self._heads.get(raw) or self._admit(raw)
+        head, (respond, _, _) = known
+        if head.expects and self._at == len(self._data):
+            self._socket.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
+        body = self._read(head.body_bytes) if head.body_bytes is not None else self._read_chunks()
+        self._phase = _Phase.ANSWERING
+        response = respond(body, self._is_connected)
+        del body
         if response.take_over is not None:
-            self._busy = False
-            self._socket.settimeout(None)
-            response.take_over(self._socket, request.rest)
+            self._hand_over(response, response.take_over)
+            return False
+        keep = head.keep_alive and self.is_known and not self._stopping
+        self._send(response, keep, head.method != "HEAD")
         return keep
 
-    def _send(self, data: bytes, more: bytes = b"") -> None:
-        """Send everything to a client that keeps reading."""
-        self.waiting_since = time.monotonic()
-        self._sending.append(len(data) + len(more))
+    def _admit(self, raw: bytes) -> _Known:
+        """Read a new head, and let the application admit it."""
         try:
-            sent = self._socket.send(data)
-            if more or sent < len(data):
-                self._send_rest(sent, memoryview(data)[sent:], memoryview(more))
-            self._sending.pop()
-        except (OSError, IndexError) as error:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _DISCARD_UNREAD)
-            raise ConnectionAbortedError("an answer was not read") from error
+            head = RequestHead(raw)
+        except HttpParserError as error:
+            raise self._refusal(400, str(error)) from None
+        admission = self._app.admit({**self._base_environ, **head.environ})
+        if isinstance(admission, Response):
+            raise _RefusedError(admission, with_body=head.method != "HEAD")
+        self._check_size(head.body_bytes or 0)
+        if admission.is_known and not self.is_known:
+            self.is_known = True
+            self._socket.settimeout(_IDLE_SECONDS)
+        known = _Known(head, admission)
+        if admission.lasts and len(raw) <= _LONGEST_HEAD:
+            if len(self._heads) == _MOST_HEADS:
+                self._heads.clear()
+            self._heads[raw] = known
+        return known
 
-    def _send_rest(self, sent: int, *parts: memoryview) -> None:
-        pace = _Pace()
-        for part in parts:
-            while part:
-                self._wait_at_most(pace.left(sent))
-                sent = self._socket.send(part)
-                part = part[sent:]
-                self.waiting_since = time.monotonic()
-        self._wait_at_most(_REST_SECONDS)
+    def _refusal(self, status: int, reason: str = "") -> _RefusedError:
+        return _RefusedError(self._app.refuse(status, reason))
 
-    def _respond(self, request: Request) -> Response:
-        if request.refusal is not None:
-            return request.refusal
-        # A client that plays sends the same head with every step.
-        if self._last is None or not request.same_head(self._last):
-            try:
-                self._last_environ = {**self._base_environ, **request.environ()}
-            except HttpParserError as error:
-                return self._app.refuse(400, str(error))
-            self._last = request
-        body = bytes(request.body)
-        request.body = b""
-        environ = {
-            **self._last_environ,
-            "CONTENT_LENGTH": str(len(body)),
-            "wsgi.input": io.BytesIO(body),
-            "gym_server.is_connected": self._is_connected,
-        }
-        if not self._is_recognized:
-            self._recognize(environ)
-        return self._app.respond(environ)
+    def _check_size(self, size: int) -> None:
+        if size > self._max_body_bytes:
+            raise self._refusal(413)
+
+    # Receiving ------------------------------------------------------------------------------
+
+    def _receive(self, most: int = _RECEIVE_BYTES) -> bytes:
+        if not self.is_known:
+            self._limit_time()
+        data = self._socket.recv(most)
+        if not data:
+            raise ConnectionError("the client has left")
+        return data
+
+    def _limit_time(self) -> None:
+        """Let the next wait for an unknown client end in time."""
+        left = self._due - time.monotonic()
+        if left <= 0:
+            raise TimeoutError("a client that is not known has no more time")
+        self._socket.settimeout(left)
+
+    def _read_head(self) -> bytes:
+        """Return the next head, up to and with the empty line."""
+        while True:
+            # Empty lines may precede a request.
+            self._data = self._data[self._at :].lstrip(b"\r\n")
+            self._at = 0
+            if self._data:
+                self._phase = _Phase.RECEIVING
+                return self._read_until(b"\r\n\r\n", "its head")
+            self._phase = _Phase.IDLE
+            self._data = self._receive()
+            self.heard = time.monotonic()
+
+    def _read_until(self, mark: bytes, what: str) -> bytes:
+        """Return what comes up to and with a mark."""
+        begin = searched = self._at
+        while (end := self._data.find(mark, searched)) < 0:
+            if len(self._data) - begin > MOST_BYTES:
+                break
+            self._data, begin = self._data[begin:], 0
+            searched = max(0, len(self._data) - len(mark) + 1)
+            self._data += self._receive()
+        self._at = end + len(mark)
+        if end < 0 or self._at - begin > MOST_BYTES:
+            raise self._refusal(400, f"{what} has more than {MOST_BYTES} bytes")
+        return self._data[begin : self._at]
+
+    def _read(self, size: int) -> bytes:
+        """Return the next bytes."""
+        begin, self._at = self._at, self._at + size
+        data = self._data[begin : self._at]
+        if len(data) == size:
+            return data
+        self._data, self._at = b"", 0
+        parts, left = [data], size - len(data)
+        while left:
+            parts.append(self._receive(min(left, _RECEIVE_BYTES)))
+            left -= len(parts[-1])
+        return b"".join(parts)
+
+    def _read_chunks(self) -> bytes:
+        """Return a body that comes in chunks."""
+        body = bytearray()
+        while size := self._read_chunk_size():
+            self._check_size(len(body) + size)
+            body += self._read(size)
+            if self._read(2) != b"\r\n":
+                raise self._refusal(400, "a chunk is longer than it says")
+        for _ in range(_MOST_TRAILERS):
+            if self._read_until(b"\r\n", "a trailer") == b"\r\n":
+                return bytes(body)
+        raise self._refusal(400, f"it has more than {_MOST_TRAILERS} trailers")
+
+    def _read_chunk_size(self) -> int:
+        match = _CHUNK_SIZE.fullmatch(self._read_until(b"\r\n", "the size of a chunk"))
+        if match is None:
+            raise self._refusal(400, "a chunk does not say its size")
+        return int(match[1], 16)
 
     def _is_connected(self) -> bool:
         """Return whether the client's end is still open; called by the serving thread."""
@@ -263,50 +251,62 @@ class Connection:
             with contextlib.suppress(OSError):
                 self._socket.settimeout(seconds)
 
-    def eviction_rank(self, now: float) -> tuple[int, float] | None:
-        """Return a key to sort connections for eviction, smallest first; None if not evictable.
+    # Sending --------------------------------------------------------------------------------
 
-        Connections of unrecognized clients come first, then those whose client does not read its
-        response, then idle ones. Among equals, the one that has waited longest is first.
+    def _send(self, response: Response, keep: bool, with_body: bool = True) -> None:
+        if not self.is_known:
+            self._limit_time()
+        head, body = _head(response, keep), response.body if with_body else b""
+        # One packet where the copy is cheap: a second one would arrive later.
+        if len(body) <= _COPIED_BYTES:
+            self._socket.sendall(head + body)
+        else:
+            self._socket.sendall(head)
+            self._socket.sendall(body)
 
-        Args:
-            now: the clock's seconds.
-        """
-        is_slow = now > self.waiting_since + _UNREAD_SECONDS
-        if self._busy and not (self._sending and is_slow):
-            return None
-        # The client of a new connection may soon be recognized.
-        is_foreign = is_slow and not self._is_recognized
-        return (0 if is_foreign else 1 if self._busy else 2), self.waiting_since
+    def _discard(self) -> None:
+        """Let a client that is still sending see the response."""
+        self._socket.shutdown(socket.SHUT_WR)
+        ends = math.inf if self.is_known else self._due
+        left = _DISCARD_BYTES
+        self._socket.settimeout(_DISCARD_SECONDS)
+        while left > 0 and time.monotonic() < ends:
+            data = self._socket.recv(_RECEIVE_BYTES)
+            if not data:
+                break
+            left -= len(data)
 
-    def evict(self) -> bool:
-        """End the connection if it is only waiting for its client; return whether it did."""
-        how = socket.SHUT_RD
-        if self._busy:
-            try:
-                self._sending.pop()
-            except IndexError:
-                return False
-            how = socket.SHUT_RDWR
-        with contextlib.suppress(OSError):
-            # A request that an idle client has just sent is still answered.
-            self._socket.shutdown(how)
-        return True
+    def _hand_over(
+        self, response: Response, take_over: Callable[[socket.socket, bytes], None]
+    ) -> None:
+        self._send(response, keep=True)
+        self._phase = _Phase.TAKEN_OVER
+        self._socket.settimeout(None)
+        take_over(self._socket, self._data[self._at :])
+
+    # For other threads ----------------------------------------------------------------------
 
     def stop(self, half_sent: bool) -> None:
         """Make ``serve()`` end once it has answered the requests that have arrived.
 
         Args:
-            half_sent: whether to drop requests that have only partly arrived, and unread
-                responses that need not be delivered.
+            half_sent: whether to drop requests that have only partly arrived.
         """
         self._stopping = True
-        if self._busy and self._sends_no_store and half_sent:
-            with contextlib.suppress(OSError):
-                self._socket.shutdown(socket.SHUT_RDWR)
-        if not self._busy and (half_sent or not self._parser.began):
-            with contextlib.suppress(OSError):
-                self._socket.shutdown(socket.SHUT_RD)
+        if self._phase in (_Phase.IDLE, _Phase.TAKEN_OVER) or (
+            half_sent and self._phase is _Phase.RECEIVING
+        ):
+            self.end()
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it waits for a request or the rest of one."""
+        return self._phase in (_Phase.IDLE, _Phase.RECEIVING)
+
+    def end(self) -> None:
+        """Receive no more; a request that has arrived is still answered."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RD)
 
 
 # In capitals, as in Flask's responses, and as classic clients show them.
@@ -325,7 +325,7 @@ def _head(response: Response, keep: bool) -> bytes:
     for name, value in response.headers:
         head += f"{name}: {value}\r\n"
     head += f"Date: {_date(int(time.time()))}\r\n"
-    if not keep and response.status != _SWITCHING:
+    if not keep:
         head += "Connection: close\r\n"
     return f"{head}\r\n".encode("latin-1")
 

@@ -12,17 +12,19 @@ import sys
 import threading
 import time
 
-from gym_server.budget import Budget
-from gym_server.http_server import connections
 from gym_server.http_server.connection import Connection
-from gym_server.http_server.connections import Connections
 from gym_server.http_server.interface import Application
 
 log = logging.getLogger(__name__)
 
-# The interval between two searches for slow readers, and between two warnings, in seconds.
-_SEARCH_SECONDS = 1.0
+# Each has a thread, which takes some memory.
+_MOST_CONNECTIONS = 512
+
+# The interval between two warnings, in seconds.
 _WARN_SECONDS = 10.0
+
+# How long to wait, if there is no room for a connection, for another one to end.
+_MOMENT_SECONDS = 0.1
 
 # After the stop, a client that has sent part of a request gets this long to send the rest.
 _HALF_SENT_SECONDS = 2.0
@@ -64,25 +66,17 @@ def bind(host: str, port: int) -> socket.socket:
 class Server:
     """A server on a bound socket."""
 
-    def __init__(
-        self,
-        app: Application,
-        listener: socket.socket,
-        max_body_bytes: int,
-        bodies: Budget,
-    ) -> None:
+    def __init__(self, app: Application, listener: socket.socket, max_body_bytes: int) -> None:
         """Prepare to serve; ``run()`` starts.
 
         Args:
             app: the application.
             listener: a listening socket from ``bind()``.
             max_body_bytes: the size of the largest request body.
-            bodies: the memory for large request bodies; small ones are not counted.
         """
         self._app = app
         self._listener = listener
         self._max_body_bytes = max_body_bytes
-        self._bodies = bodies
         host, self.port = listener.getsockname()[:2]
         self._base_environ = {
             "SCRIPT_NAME": "",
@@ -90,7 +84,9 @@ class Server:
             "SERVER_PORT": str(self.port),
             "wsgi.url_scheme": "http",
         }
-        self._connections = Connections()
+        # Each until its thread has ended.
+        self._connections: set[Connection] = set()
+        self._changed = threading.Condition()
         self._warned = -math.inf
         self._stop_asked = threading.Event()
         self._wake, self._waker = socket.socketpair()
@@ -112,59 +108,66 @@ class Server:
             Whether all of them were answered.
         """
         self._listener.setblocking(False)
-        searched = time.monotonic()
         while not self._stop_asked.is_set():
             # On Windows, signals are handled only after the wait.
             if self._listener in select.select([self._listener, self._wake], [], [], 1.0)[0]:
                 self._accept()
-            if time.monotonic() > searched + _SEARCH_SECONDS:
-                searched = time.monotonic()
-                self._connections.evict_unread()
         self._listener.close()
         self._wake.close()
         self._waker.close()
         self._app.begin_stop()
-        return self._connections.drain(grace, _HALF_SENT_SECONDS)
+        return self._drain(grace)
+
+    def _drain(self, grace: float) -> bool:
+        """End the connections as they have no request in progress; return whether all ended."""
+        stopped = time.monotonic()
+        with self._changed:
+            while self._connections and time.monotonic() < stopped + grace:
+                half_sent = time.monotonic() > stopped + _HALF_SENT_SECONDS
+                for connection in self._connections:
+                    connection.stop(half_sent)
+                self._changed.wait(0.05)
+            return not self._connections
 
     def _accept(self) -> None:
-        if len(self._connections) >= connections.MOST_CONNECTIONS:
+        if len(self._connections) >= _MOST_CONNECTIONS:
             # Further clients wait in the socket's backlog.
-            self._connections.make_room()
+            self._make_room(f"No more connections: it has {_MOST_CONNECTIONS}")
             return
         try:
             client, address = self._listener.accept()
         except OSError as error:
             if error.errno in (errno.EMFILE, errno.ENFILE):
-                self._warn("No more connections: this process may open no more files")
-                self._connections.make_room()
+                self._make_room("No more connections: this process may open no more files")
             return  # Otherwise the client has already left.
         client.setblocking(True)
-        connection = Connection(
-            client,
-            self._app,
-            {**self._base_environ, "REMOTE_ADDR": address[0]},
-            self._max_body_bytes,
-            self._bodies.share(),
-        )
-        if not self._connections.add(connection, address[0]):
-            self._warn(f"No more connections from {address[0]}: all that it has are at work")
-            client.close()
-            return
+        environ = {**self._base_environ, "REMOTE_ADDR": address[0]}
+        connection = Connection(client, self._app, environ, self._max_body_bytes)
+        with self._changed:
+            self._connections.add(connection)
         # A daemon thread, so that a call that never returns does not keep the process alive.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
             thread.start()
         except RuntimeError:
-            self._warn("No more connections: this process may start no more threads")
-            self._connections.remove(connection)
             client.close()
-            self._connections.make_room()
+            self._remove(connection)
+            self._make_room("No more connections: this process may start no more threads")
 
-    def _warn(self, message: str) -> None:
+    def _make_room(self, why: str) -> None:
+        """End the connection that was silent for longest; those of unknown clients come first.
+
+        Waits briefly until any has ended.
+        """
         # A client can trigger this a thousand times a second.
         if time.monotonic() > self._warned + _WARN_SECONDS:
             self._warned = time.monotonic()
-            log.warning("%s", message)
+            log.warning("%s", why)
+        with self._changed:
+            waiting = [one for one in self._connections if one.is_waiting]
+            if waiting:
+                min(waiting, key=lambda one: (one.is_known, one.heard)).end()
+            self._changed.wait(_MOMENT_SECONDS)
 
     def _serve(self, connection: Connection) -> None:
         try:
@@ -172,4 +175,9 @@ class Server:
         except Exception:
             log.exception("A connection ended because of a bug in the server")
         finally:
-            self._connections.remove(connection)
+            self._remove(connection)
+
+    def _remove(self, connection: Connection) -> None:
+        with self._changed:
+            self._connections.discard(connection)
+            self._changed.notify()

@@ -60,9 +60,16 @@ def _text(value: Any) -> str:
 
 def _size(value: Any) -> int:
     """Return how many numbers a value holds, assuming that the rows of a list are alike."""
-    if type(value) is dict:
-        return sum([_size(item) for item in value.values()])
-    return len(value) * _size(value[0]) if type(value) is list and value else 1
+    size = 1
+    while type(value) is list and value:
+        size *= len(value)
+        value = value[0]
+    if type(value) is not dict:
+        return size
+    inside = 0
+    for item in value.values():
+        inside += _size(item) if type(item) is list or type(item) is dict else 1
+    return size * inside
 
 
 class AnswerForm(NamedTuple):
@@ -114,7 +121,7 @@ def response_to(
         content_type = COLUMN_TENSORS if observation.by_column else TENSORS
         return Response(status, _dumps_tensors(request_id, **result), content_type)
     if request_id is not None:
-        result = {**result, "request": request_id._asdict()}
+        result = {**result, "request": request_id.echo()}
     return Response(status, dumps(result))
 
 

@@ -183,19 +183,3 @@ def test_tensors_can_be_sent_with_the_wish_for_no_infos(client, create):
         assert answer.status_code == status
     assert answer.json["code"] == "invalid_parameter"
     assert "'info'" in json.loads(answer.data)["message"]
-
-
-# The Accept header of the R client; see R/http-connection.R.
-R_ACCEPTS = "application/x-safetensors; order=column, application/x-safetensors;q=0.9"
-
-
-@pytest.mark.parametrize("accept", ["application/json", TENSORS, COLUMN_TENSORS, R_ACCEPTS])
-def test_what_clients_send_with_each_step_is_not_parsed(client, create, monkeypatch, accept):
-    def parse(*_):
-        raise AssertionError("parsed")
-
-    url = create(num_envs=3)
-    parsed = client.post(f"{url}/reset/", headers={"Accept": f"{accept}, text/plain;q=0.1"})
-    monkeypatch.setattr("gym_server.api.endpoint.parse_accept_header", parse)
-    answer = client.post(f"{url}/reset/", headers={"Accept": accept})
-    assert (answer.status_code, answer.content_type) == (200, parsed.content_type)

@@ -2,27 +2,28 @@ import threading
 
 import pytest
 
-from gym_server.api.exactly_once import ExactlyOnce, Outcome
+from gym_server.api import exactly_once
+from gym_server.api.exactly_once import ExactlyOnce
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import RequestId
 from gym_server.response import Response
 
 
 class Counter:
-    """Counts its calls, which use or create an instance."""
+    """Counts its calls."""
 
-    def __init__(self, did_something=True, instance_id=None):
+    def __init__(self, did_something=True):
         self.calls = 0
-        self.did_something, self.instance_id = did_something, instance_id
+        self.did_something = did_something
 
     def __call__(self):
         self.calls += 1
-        return outcome(self.calls, self.did_something, self.instance_id)
+        return outcome(self.calls, self.did_something)
 
 
-def outcome(text, *what, size=0):
-    """Return an outcome whose response has a text and a size in bytes."""
-    return Outcome(Response(200, bytes(size), str(text)), *what)
+def outcome(text, did_something=True, size=0):
+    """Return a response that has a text and a size in bytes, and whether something was done."""
+    return Response(200, bytes(size), str(text)), did_something
 
 
 class Once(ExactlyOnce):
@@ -34,25 +35,22 @@ class Once(ExactlyOnce):
 
     def answer(self, request_id, content, act, instance_id="i"):
         """Return the text of the response, or the number in it."""
-        if isinstance(act, Counter) and act.instance_id is None:
-            act.instance_id = instance_id
         text = self.respond(request_id, instance_id, content, len(content), act).content_type
         return int(text) if text.isdigit() else text
 
 
 def conflict(*arguments):
-    return refused(*arguments) == "request_conflict"
-
-
-def refused(*arguments):
     with pytest.raises(GymServerError) as refusal:
         Once.answer(*arguments)
-    return refusal.value.code
+    return refusal.value.code == "request_conflict"
+
+
+NUMBER_1 = RequestId("a", 1)
 
 
 def test_a_repetition_gets_the_stored_answer():
     once, act = Once(), Counter()
-    assert [once.answer(RequestId("a", 1), "step", act) for _ in range(3)] == [1, 1, 1]
+    assert [once.answer(NUMBER_1, "step", act) for _ in range(3)] == [1, 1, 1]
     assert act.calls == 1
 
 
@@ -65,15 +63,15 @@ def test_the_next_number_is_done_and_gaps_are_fine():
 
 def test_another_request_under_a_used_number_is_a_conflict():
     once, act = Once(), Counter()
-    once.answer(RequestId("a", 1), "step", act)
-    assert conflict(once, RequestId("a", 1), "reset", act)
+    once.answer(NUMBER_1, "step", act)
+    assert conflict(once, NUMBER_1, "reset", act)
     assert act.calls == 1
 
 
 def test_a_lower_number_is_a_conflict():
     once, act = Once(), Counter()
     once.answer(RequestId("a", 2), "step", act)
-    assert conflict(once, RequestId("a", 1), "step", act)
+    assert conflict(once, NUMBER_1, "step", act)
     assert act.calls == 1
 
 
@@ -83,21 +81,25 @@ def test_keys_count_for_themselves():
     assert once.answer(RequestId("b", 1), "step", act) == 2
 
 
-def test_a_repetition_waits_for_the_first_that_still_runs():
-    once, act = Once(), Counter()
+def test_numbers_grow_for_each_instance_by_itself():
+    once, act = Once(living=["i", "j"]), Counter()
+    once.answer(RequestId("a", 2**62), "step", Counter(), "j")
+    assert [once.answer(NUMBER_1, "step", act) for _ in range(2)] == [1, 1]
+
+
+def answers_of(once, first, others):
+    """Return the answers to repetitions that arrive while the first request runs."""
     began, may_end = threading.Event(), threading.Event()
 
     def slow():
         began.set()
         assert may_end.wait(10)
-        return act()
+        return first()
 
     answers = []
     threads = [
-        threading.Thread(
-            target=lambda: answers.append(once.answer(RequestId("a", 1), "step", slow))
-        )
-        for _ in range(4)
+        threading.Thread(target=lambda do=do: answers.append(once.answer(NUMBER_1, "step", do)))
+        for do in (slow, *others)
     ]
     threads[0].start()
     assert began.wait(10)
@@ -106,7 +108,22 @@ def test_a_repetition_waits_for_the_first_that_still_runs():
     may_end.set()
     for thread in threads:
         thread.join(10)
-    assert answers == [1, 1, 1, 1]
+    return sorted(map(str, answers))
+
+
+def test_a_repetition_waits_for_the_first_that_still_runs():
+    act = Counter()
+    assert answers_of(Once(), act, [act] * 3) == ["1"] * 4
+
+
+def test_a_repetition_that_waits_for_what_is_refused_is_done():
+    act = Counter()
+    assert answers_of(Once(), lambda: outcome("refused", False), [act, act]) == [
+        "1",
+        "1",
+        "refused",
+    ]
+    assert act.calls == 1
 
 
 def test_a_key_does_not_wait_for_another():
@@ -114,7 +131,7 @@ def test_a_key_does_not_wait_for_another():
     began, may_end = threading.Event(), threading.Event()
     slow = threading.Thread(
         target=once.answer,
-        args=(RequestId("a", 1), "step", lambda: outcome((began.set(), may_end.wait(10)))),
+        args=(NUMBER_1, "step", lambda: outcome((began.set(), may_end.wait(10)))),
     )
     slow.start()
     assert began.wait(10)
@@ -123,128 +140,68 @@ def test_a_key_does_not_wait_for_another():
     slow.join(10)
 
 
-def test_what_was_refused_before_anything_moved_leaves_nothing():
+def test_what_was_refused_before_anything_moved_uses_up_no_number():
     once, refuse, act = Once(), Counter(did_something=False), Counter()
     for number in range(3):
         assert once.answer(RequestId("a", 2**62), "step", refuse) == number + 1
-    assert not once._table
-    assert once.answer(RequestId("a", 1), "step", act) == 1
+    assert once.answer(NUMBER_1, "step", act) == 1
     once.answer(RequestId("a", 2), "step", refuse)
     # The key's previous request is still known.
-    assert once.answer(RequestId("a", 1), "step", act) == 1
-    assert act.calls == 1
-
-
-def test_a_repetition_that_waits_for_what_is_refused_is_done():
-    once, act = Once(), Counter()
-    began, may_end = threading.Event(), threading.Event()
-
-    def refuse():
-        began.set()
-        assert may_end.wait(10)
-        return outcome("refused", False)
-
-    answers = []
-    threads = [
-        threading.Thread(target=lambda do=do: answers.append(once.answer(NUMBER_1, "step", do)))
-        for do in (refuse, act, act)
-    ]
-    threads[0].start()
-    assert began.wait(10)
-    for thread in threads[1:]:
-        thread.start()
-    may_end.set()
-    for thread in threads:
-        thread.join(10)
-    assert (sorted(map(str, answers)), act.calls) == (["1", "1", "refused"], 1)
-
-
-NUMBER_1 = RequestId("a", 1)
-
-
-def test_numbers_grow_for_each_instance_by_itself():
-    once, act = Once(living=["i", "j"]), Counter()
-    # A guessed key blocks only the instance that it is used on.
-    once.answer(RequestId("a", 2**62), "step", Counter(), "j")
-    assert once.answer(NUMBER_1, "step", act) == 1
     assert once.answer(NUMBER_1, "step", act) == 1
     assert act.calls == 1
 
 
 def test_creations_have_no_order():
-    once = Once(living=["i", "j"])
-    once.answer(RequestId("a", 2**62), "create", Counter(instance_id="j"), None)
-    act = Counter(instance_id="i")
+    once, act = Once(), Counter()
+    once.answer(RequestId("a", 2**62), "create", Counter(), None)
     assert [once.answer(NUMBER_1, "create", act, None) for _ in range(2)] == [1, 1]
-    assert act.calls == 1
 
 
-def test_the_last_call_on_a_living_instance_and_its_creation_are_never_forgotten():
-    once, created, stepped = Once(kept_seconds=0, most_gone=0, most_keys=2), Counter(), Counter()
-    created.instance_id = "i"
-    once.answer(NUMBER_1, "create", created, None)
-    once.answer(NUMBER_1, "step", Counter())
-    once.answer(RequestId("b", 1), "step", stepped)
-    # Another key was idle for so long that it makes room.
-    refuse = Counter(did_something=False)
-    once.answer(RequestId("c", 1), "step", refuse)
-    assert set(once._table["i"]) == {"b"}
-    assert once.answer(NUMBER_1, "create", created, None) == 1
-    assert once.answer(RequestId("b", 1), "step", stepped) == 1
-    assert (created.calls, stepped.calls) == (1, 1)
+def test_of_many_creations_the_oldest_are_refused_and_never_done_again():
+    once, act = Once(most_unordered=3), Counter()
+    for number in (2, 1, 4, 5, 6):
+        once.answer(RequestId("a", number), "create", act, None)
+    assert once.answer(RequestId("a", 4), "create", act, None) == 3
+    assert all(conflict(once, RequestId("a", n), "create", act, None) for n in (0, 1, 2))
+    assert once.answer(RequestId("a", 3), "create", act, None) == 6
+    assert once.answer(RequestId("b", 1), "create", act, None) == 7
 
 
-def test_what_is_known_of_instances_that_are_gone_is_dropped_when_many_rows_have_come():
-    once, living = Once(living=["i", "mine"], most_gone=3), Counter()
-    once.answer(NUMBER_1, "step", living, "mine")
-    once.answer(NUMBER_1, "create", Counter(instance_id="i"), None)
-    once.answer(NUMBER_1, "step", Counter())
+def test_what_is_known_of_an_instance_goes_with_it():
+    once, kept, act = Once(living=["i", "mine"]), Counter(), Counter()
+    once.answer(NUMBER_1, "step", kept, "mine")
+    once.answer(NUMBER_1, "step", lambda: outcome("large", size=1000))
     once.living.remove("i")
-    assert set(once._table) == {"mine", None, "i"}
-    once.answer(NUMBER_1, "create", Counter(instance_id="j"), None)
-    once.answer(RequestId("b", 1), "create", Counter(instance_id="mine"), None)
-    assert set(once._table) == {"mine", None}
-    assert set(once._table[None]) == {RequestId("b", 1)}
-    assert once.answer(NUMBER_1, "step", living, "mine") == 1
-    assert living.calls == 1
-
-
-def test_an_instance_takes_only_so_many_keys_and_goes_on_with_those():
-    once, act = Once(most_keys=3), Counter()
-    for key in "abc":
-        once.answer(RequestId(key, 1), "step", act)
-    late = Counter()
-    assert refused(once, RequestId("d", 1), "step", late) == "too_many_keys"
-    assert late.calls == 0
-    assert [once.answer(RequestId(key, 1), "step", late) for key in "abc"] == [1, 2, 3]
-    assert once.answer(RequestId("a", 2), "step", act) == 4
-
-
-def test_a_key_that_is_in_use_is_not_forgotten():
-    once, act = Once(living=[], most_gone=0), Counter()
-
-    def meanwhile():
-        once.answer(RequestId("other", 1), "step", Counter(), "j")
-        return outcome("slow", True, "i")
-
-    once.answer(NUMBER_1, "step", Counter())
-    assert once.answer(RequestId("a", 2), "step", meanwhile) == "slow"
-    assert once.answer(RequestId("a", 2), "step", act) == "slow"
-    assert act.calls == 0
+    once.forget_closed()
+    assert once._bytes == len("step")
+    # Nothing is remembered of calls to one that does not exist.
+    assert [once.answer(NUMBER_1, "step", act) for _ in range(2)] == [1, 2]
+    assert list(once._rows) == ["mine"]
+    assert once.answer(NUMBER_1, "step", kept, "mine") == 1
+    assert kept.calls == 1
 
 
 def test_what_all_keep_together_is_bounded_and_nothing_is_done_again():
-    once = Once(living="ijk", most_bytes=320)
-    once.answer(RequestId("first", 1), "", lambda: outcome("first", size=80), "i")
-    for instance_id, size in zip("ijk", (90, 70, 150), strict=True):
-        once.answer(
-            NUMBER_1, "x" * 10, lambda size=size: outcome(size, True, size=size), instance_id
-        )
-    act = Counter()
-    # The largest one was dropped.
-    assert [once.answer(NUMBER_1, "x" * 10, act, one) for one in "ij"] == [90, 70]
-    assert once.answer(RequestId("first", 1), "", act, "i") == "first"
-    assert conflict(once, NUMBER_1, "x" * 10, act, "k")
+    once, act = Once(living="ijk", most_bytes=320), Counter()
+    for instance_id, size in zip("ijk", (150, 90, 70), strict=True):
+        once.answer(NUMBER_1, "x" * 10, lambda size=size: outcome(size, size=size), instance_id)
+    # The oldest one was dropped.
+    assert [once.answer(NUMBER_1, "x" * 10, act, one) for one in "jk"] == [90, 70]
+    assert conflict(once, NUMBER_1, "x" * 10, act, "i")
     assert act.calls == 0
-    assert once.answer(RequestId("a", 2), "step", act, "k") == 1
-    assert once._bytes == sum(row.size for rows in once._table.values() for row in rows.values())
+    assert once.answer(RequestId("a", 2), "x" * 10, act, "i") == 1
+    assert once._bytes == sum(once._sizes.values()) == 190
+    # One that is larger than all may be together is not kept.
+    assert once.answer(RequestId("a", 3), "", lambda: outcome("huge", size=321), "i") == "huge"
+    assert conflict(once, RequestId("a", 3), "", act, "i")
+    assert once._bytes == 0
+
+
+def test_a_key_of_a_server_that_has_ended_is_refused():
+    once, act = Once(), Counter()
+    for instance_id in ("i", None):
+        assert once.answer(RequestId("a", 1, exactly_once.START), "", act, instance_id)
+        with pytest.raises(GymServerError) as refusal:
+            once.answer(RequestId("a", 2, "another"), "", act, instance_id)
+        assert refusal.value.code == "server_restarted"
+    assert act.calls == 2

@@ -38,13 +38,3 @@ def test_what_is_not_ascii_is_read_as_utf_8(found):
 
 def test_a_path_may_begin_with_several_slashes(found):
     assert found("//v1/envs/") == found("/v1/envs/")
-
-
-def test_a_route_is_found_again_by_its_method_and_whatever_was_asked_meanwhile(found, monkeypatch):
-    monkeypatch.setattr("gym_server.api.routing._MOST_KNOWN", 3)
-    for _ in range(2):
-        for number in range(5):
-            path, variables = f"/v1/envs/{number}/", {"instance_id": str(number)}
-            assert found(path) == found(path, "HEAD") == ("env_about", variables)
-            assert found(path, "DELETE") == ("env_delete", variables)
-            assert found(path, "POST") is None

@@ -1,25 +1,22 @@
 """The code of one connection, with short timeouts, and a client that behaves badly."""
 
-import gc
 import socket
 import threading
 import time
-import weakref
 from contextlib import suppress
 
 import pytest
 
-from gym_server.budget import Budget
 from gym_server.http_server import connection as connection_module
 from gym_server.http_server.connection import Connection
-from gym_server.response import Response
+from gym_server.response import Admission, Response
 
 pytestmark = pytest.mark.slow
 
 GET = b"GET /%s HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 POST = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n"
+CHUNKED = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n"
 LARGE = 2**24
-ROOM = 2**18
 
 
 def echo(client, data):
@@ -29,49 +26,46 @@ def echo(client, data):
 
 
 class App:
-    """Returns as many bytes as the path says."""
+    """Returns as many bytes as the path says, or the size of the body."""
 
-    def __init__(self, recognizes):
-        self.recognizes = recognizes
-
-    def respond(self, environ):
-        environ["wsgi.input"].read()
-        if environ.get("HTTP_UPGRADE") == "websocket" and environ["PATH_INFO"] == "/echo":
-            headers = (("Upgrade", "websocket"), ("Connection", "Upgrade"))
-            return Response(101, b"", headers=headers, take_over=echo)
-        return Response(200, bytes(int(environ["PATH_INFO"].strip("/") or 0)))
+    def __init__(self, knows=True, lasts=True):
+        self.knows, self.lasts = knows, lasts
+        self.admitted, self.bodies = [], []
 
     def admit(self, environ):
-        return None
+        path = environ["PATH_INFO"]
+        self.admitted.append(path)
+        if path == "/refused":
+            return Response(403, b"no")
+
+        def respond(body, is_connected):
+            self.bodies.append(body)
+            if environ.get("HTTP_UPGRADE") == "websocket" and path == "/echo":
+                headers = (("Upgrade", "websocket"), ("Connection", "Upgrade"))
+                return Response(101, b"", headers=headers, take_over=echo)
+            return Response(200, bytes(int(path.strip("/") or 0)))
+
+        return Admission(respond, self.knows, self.lasts)
 
     def refuse(self, status, reason):
-        return Response(status, reason.encode(), headers=(("Retry-After", "5"),))
+        return Response(status, reason.encode())
 
 
 @pytest.fixture
-def short_timeouts(monkeypatch):
-    monkeypatch.setattr(connection_module, "_REST_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_UNRECOGNIZED_SECONDS", 0.5)
-    monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 2**20)
-
-
-@pytest.fixture
-def converse(short_timeouts):
+def converse(monkeypatch):
     """Return a function that connects a client to a new connection, and returns the thread."""
+    monkeypatch.setattr(connection_module, "_UNKNOWN_SECONDS", 0.5)
     listener = socket.create_server(("127.0.0.1", 0))
     clients, threads = [], []
 
-    def converse(
-        budget=None, most=2**20, seen=lambda connection: None, recognizes=lambda environ: True
-    ):
+    def converse(app=None, most=2**20, seen=lambda connection: None):
         client = socket.socket()
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         client.settimeout(20)
         client.connect(listener.getsockname())
         accepted, _ = listener.accept()
         environ = {"wsgi.url_scheme": "http", "SERVER_NAME": "x"}
-        bodies = (budget or Budget(ROOM)).share()
-        connection = Connection(accepted, App(recognizes), environ, most, bodies)
+        connection = Connection(accepted, app or App(), environ, most)
         seen(connection)
         thread = threading.Thread(target=connection.serve)
         thread.start()
@@ -97,49 +91,191 @@ def read_head(client):
     return data
 
 
-# Answers that are not read -------------------------------------------------------------------
+def read_all(client):
+    data = b""
+    with suppress(ConnectionError):
+        while more := client.recv(65536):
+            data += more
+    return data
 
 
-@pytest.mark.parametrize("asked", [1, 50])
-def test_an_answer_that_is_not_read_ends_the_connection(converse, asked):
-    client, thread = converse()
-    client.sendall(GET % b"%d" % LARGE * asked)
-    thread.join(20)
+# Known clients -------------------------------------------------------------------------------
+
+
+def test_a_known_client_may_be_silent_for_long_and_as_slow_as_it_likes(converse):
+    client, _ = converse()
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
+    # Longer than an unknown client may take.
+    time.sleep(1)
+    for byte in POST % 10 + bytes(10):
+        client.sendall(bytes([byte]))
+        time.sleep(0.01)
+    assert b"200 OK" in read_head(client)
+
+
+def test_a_large_answer_arrives_in_full_however_slowly_it_is_read(converse):
+    client, _ = converse()
+    client.sendall(GET % b"%d" % 2**20)
+    received = len(read_head(client))
+    while received < 2**20:
+        received += len(client.recv(65536))
+        time.sleep(0.02)
+    client.sendall(GET % b"")
+    assert b"200 OK" in read_head(client)
+
+
+def test_a_head_is_read_and_admitted_once(converse):
+    app = App()
+    client, _ = converse(app)
+    for _ in range(2):
+        for path in (b"1", b"2"):
+            client.sendall(GET % path)
+            read_head(client)
+    assert app.admitted == ["/1", "/2"]
+
+
+def test_a_head_whose_admission_does_not_last_is_admitted_each_time(converse):
+    app = App(lasts=False)
+    client, _ = converse(app)
+    for _ in range(2):
+        client.sendall(GET % b"1")
+        read_head(client)
+    assert app.admitted == ["/1", "/1"]
+
+
+def test_heads_that_are_remembered_are_few(converse):
+    connections = []
+    client, _ = converse(seen=connections.append)
+    for number in range(100):
+        client.sendall(GET % b"%d" % number)
+        read_head(client)
+    client.sendall(GET.replace(b"Host", b"X: %b\r\nHost" % (b"y" * 5000)) % b"1")
+    read_head(client)
+    assert 0 < len(connections[0]._heads) <= connection_module._MOST_HEADS
+    assert all(len(head) < 4096 for head in connections[0]._heads)
+
+
+# Unknown clients -----------------------------------------------------------------------------
+
+
+def test_an_unknown_client_gets_one_answer(converse):
+    client, _ = converse(App(knows=False))
+    client.sendall((GET % b"") * 2)
+    answer = read_all(client)
+    assert (answer.count(b"200 OK"), answer.count(b"Connection: close")) == (1, 1)
+
+
+@pytest.mark.parametrize("begun", [b"", GET[:20], POST % 1000, CHUNKED + b"ff\r\n"])
+def test_an_unknown_client_may_not_be_silent(converse, begun):
+    client, _ = converse(App(knows=False))
+    client.sendall(begun)
+    assert client.recv(1) == b""
+
+
+@pytest.mark.parametrize(
+    ("begun", "drop"),
+    [
+        (b"", b"\r\n"),
+        (b"GET / HTTP/1.1\r\nX: ", b"y"),
+        (POST % 1000, b"y"),
+        (CHUNKED + b"fff\r\n", b"y"),
+        (GET % b"%d" % LARGE, b""),
+        (GET % b"refused", b"y"),
+    ],
+    ids=["empty lines", "head", "body", "chunk", "reading", "refused"],
+)
+def test_an_unknown_client_gains_no_time_by_dripping(converse, begun, drop):
+    client, thread = converse(App(knows=False))
+    until = time.monotonic() + 10
+    with suppress(OSError):
+        client.sendall(begun)
+        while thread.is_alive() and time.monotonic() < until:
+            client.sendall(drop) if drop else client.recv(4096)
+            thread.join(0.01)
     assert not thread.is_alive()
 
 
-def test_an_answer_that_is_read_drop_by_drop_ends_the_connection(converse):
+# Refusals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        (GET % b"refused", b"403"),
+        (b"GET /%b HTTP/1.1\r\n\r\n" % (b"x" * 70_000), b"400"),
+        (b"GET / HTTP/1.1\r\nX: %b" % (b"x" * 70_000), b"400"),
+        (POST % (2**20 + 1), b"413"),
+        (CHUNKED + b"100001\r\n", b"413"),
+        (CHUNKED + b"80000\r\n%b\r\n80001\r\n" % bytes(2**19), b"413"),
+        (CHUNKED + b"1\r\nxyz", b"400"),
+        (CHUNKED + b"x\r\n", b"400"),
+        (CHUNKED + b"-1\r\n", b"400"),
+        (CHUNKED + b"0\r\n" + b"a: b\r\n" * 200, b"400"),
+        (CHUNKED + b"0\r\n" + b"a" * 70_000, b"400"),
+    ],
+    ids=lambda value: repr(value)[:40],
+)
+def test_a_refusal_is_seen_by_a_client_that_goes_on_sending(converse, sent, status):
+    app = App()
+    client, _ = converse(app)
+    client.sendall(sent + b"GET / HTTP/1.1\r\n\r\n" * 100_000)
+    client.shutdown(socket.SHUT_WR)
+    answer = read_all(client)
+    assert answer.startswith(b"HTTP/1.1 %b " % status) and b"Connection: close" in answer
+    assert answer.count(b"HTTP/1.1") == 1
+    assert app.bodies == []
+
+
+def test_a_refused_client_that_stays_is_sent_away(converse, monkeypatch):
+    monkeypatch.setattr(connection_module, "_DISCARD_SECONDS", 0.2)
     client, thread = converse()
-    client.sendall(GET % b"%d" % LARGE)
-    received = 0
-    with suppress(ConnectionError):
-        while thread.is_alive() and received < 2**21:
-            # Never idle for the longest allowed time, but too slow.
-            received += len(client.recv(4096))
-            thread.join(0.01)
-    assert received < 2**21
+    client.sendall(GET % b"refused")
+    thread.join(10)
+    assert not thread.is_alive()
+    assert b"403" in read_all(client)
 
 
-def test_an_answer_that_is_read_steadily_arrives_in_full(converse):
+def test_a_refusal_of_a_head_request_has_no_body(converse):
     client, _ = converse()
-    client.sendall(GET % b"%d" % 2**21)
-    began, received = time.monotonic(), len(read_head(client))
-    while received < 2**21:
-        # Twice as fast as required, for longer than the longest allowed pause.
-        time.sleep(max(0, began + received / 2**21 - time.monotonic()))
-        received += len(client.recv(65536))
-    client.sendall(GET % b"")
-    assert b"200 OK" in read_head(client)
+    client.sendall((GET % b"refused").replace(b"GET", b"HEAD"))
+    client.shutdown(socket.SHUT_WR)
+    answer = read_all(client)
+    assert b"Content-Length: 2\r\n" in answer and answer.endswith(b"\r\n\r\n")
 
 
-def test_a_client_that_is_recognized_may_be_silent_for_long(converse):
+# Bodies --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [1, 5, 10**9])
+def test_a_body_is_the_same_in_however_many_pieces_it_comes(converse, size):
+    app = App()
+    client, _ = converse(app)
+    chunks = b"2\r\nab\r\n003;x=y\r\ncde\r\n0\r\nTrailer: x\r\n\r\n"
+    sent = POST % 5 + b"abcde" + CHUNKED + chunks + b"\r\n\r\n" + POST % 0 + POST % 5 + b"abcde"
+    for begin in range(0, len(sent), size):
+        client.sendall(sent[begin : begin + size])
+    answers = b""
+    while answers.count(b"200 OK") < 4:
+        answers += client.recv(65536)
+    assert app.bodies == [b"abcde", b"abcde", b"", b"abcde"]
+
+
+def test_a_body_in_tiny_chunks_is_read_soon(converse):
+    app = App()
+    client, _ = converse(app)
+    client.sendall(CHUNKED + b"2\r\nab\r\n" * 2**17 + b"0\r\n\r\n")
+    read_head(client)
+    assert app.bodies == [b"ab" * 2**17]
+
+
+def test_a_client_that_asks_before_it_sends_is_told_to_each_time(converse):
     client, _ = converse()
-    client.sendall(GET % b"")
-    assert b"200 OK" in read_head(client)
-    # Longer than a pause may be while it sends or reads.
-    time.sleep(1)
-    client.sendall(GET % b"")
-    assert b"200 OK" in read_head(client)
+    for _ in range(2):
+        client.sendall((POST % 2).replace(b"Host", b"Expect: 100-Continue\r\nHost"))
+        assert read_head(client) == b"HTTP/1.1 100 Continue\r\n\r\n"
+        client.sendall(b"{}")
+        assert read_head(client).startswith(b"HTTP/1.1 200")
 
 
 # Other protocols -----------------------------------------------------------------------------
@@ -175,106 +311,7 @@ def test_a_stop_ends_what_a_socket_that_was_taken_over_receives(converse):
 
 def test_a_websocket_that_is_declined_is_answered_as_any_request(converse):
     client, _ = converse()
-    client.sendall(WEBSOCKET % b"/3")
-    assert read_head(client).startswith(b"HTTP/1.1 200 ")
-
-
-# Clients that are not recognized -------------------------------------------------------------
-
-
-def recognizes_nobody(environ):
-    return False
-
-
-def test_an_unrecognized_client_gets_one_answer(converse):
-    client, _ = converse(recognizes=recognizes_nobody)
-    client.sendall((GET % b"") * 2)
-    answer = b""
-    while more := client.recv(65536):
-        answer += more
-    assert (answer.count(b"200 OK"), answer.count(b"Connection: close")) == (1, 1)
-
-
-@pytest.mark.parametrize("begun", [b"", GET[:20], POST % 1000])
-def test_an_unrecognized_client_may_not_be_silent(converse, begun):
-    client, _ = converse(recognizes=recognizes_nobody)
-    client.sendall(begun)
-    assert client.recv(1) == b""
-
-
-@pytest.mark.parametrize(
-    ("begun", "drop"),
-    [
-        (b"", b"\r\n"),
-        (b"GET / HTTP/1.1\r\nX: ", b"y"),
-        (POST % 1000, b"y"),
-        (POST % LARGE, b"y"),
-        (GET % b"%d" % LARGE, b""),
-    ],
-    ids=["empty lines", "head", "body", "large body", "reading"],
-)
-def test_a_client_that_is_not_recognized_gains_no_time_by_dripping(
-    converse, monkeypatch, begun, drop
-):
-    # Each byte gains a second for a recognized client.
-    monkeypatch.setattr(connection_module, "_SLOWEST_BYTES", 1)
-    client, thread = converse(most=2 * LARGE, recognizes=recognizes_nobody)
-    until = time.monotonic() + 1.5
-    with suppress(OSError):
-        client.sendall(begun)
-        while thread.is_alive() and time.monotonic() < until:
-            client.sendall(drop) if drop else client.recv(4096)
-            thread.join(0.01)
-    assert not thread.is_alive()
-
-
-def test_it_is_asked_about_a_client_until_that_is_recognized(converse):
-    asked = []
-    client, _ = converse(recognizes=lambda environ: asked.append(environ["PATH_INFO"]) or True)
-    for path in (b"1", b"2"):
-        client.sendall(GET % path)
-        read_head(client)
-    assert asked == ["/1"]
-
-
-# Bodies --------------------------------------------------------------------------------------
-
-
-def test_a_body_for_which_there_is_no_room_is_503(converse):
-    client, _ = converse()
-    client.sendall(POST % (2 * ROOM) + bytes(2 * ROOM))
-    answer = read_head(client)
-    assert answer.startswith(b"HTTP/1.1 503 ")
-    assert b"\r\nRetry-After: " in answer
-    client.sendall(GET % b"")
-    assert b"200 OK" in read_head(client)
-
-
-@pytest.mark.parametrize("sent", [ROOM, ROOM - 1], ids=["answered", "half-sent"])
-def test_the_room_of_a_body_is_given_back(converse, sent):
-    budget = Budget(ROOM)
-    client, thread = converse(budget)
-    client.sendall(POST % ROOM + bytes(sent))
-    if sent == ROOM:
-        read_head(client)
-    else:
-        client.close()
-        thread.join(10)
-    assert budget.share().take(ROOM)
-
-
-def test_what_was_half_sent_leaves_nothing_for_the_garbage_collection(converse):
-    readers = []
-    gc.collect()
-    gc.disable()
-    try:
-        client, thread = converse(
-            seen=lambda connection: readers.append(weakref.ref(connection._parser))
-        )
-        client.sendall(POST % ROOM + bytes(ROOM - 1))
-        client.close()
-        thread.join(10)
-        del thread
-        assert readers[0]() is None
-    finally:
-        gc.enable()
+    client.sendall(WEBSOCKET % b"/3" + GET % b"")
+    answers = b""
+    while answers.count(b"HTTP/1.1 200 ") < 2:
+        answers += client.recv(65536)
