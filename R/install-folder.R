@@ -1,9 +1,65 @@
-# The folder of the server's Python environment. Each version of the lock files has its own, so that
-# servers of sessions with another package version keep running.
+# The folder of the server's Python environment, and the lock files that say what is in it. Each
+# version of the lock files has its own folder, so that servers of sessions with another package
+# version keep running.
 #
 #   <cache>/gym/<lock's hash>/venv        the environment
 #                           /installed   its manifest, written when it is complete: the extras;
 #                                        the file's time is the last start of a server
+#           gym/python, gym/uv           what uv and the package downloaded
+
+server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video", "jax")
+
+check_extras <- function(extras, call = rlang::caller_env()) {
+  if (!is.character(extras) || anyNA(extras) || !all(extras %in% server_extras)) {
+    must <- paste("any of", paste0('"', server_extras, '"', collapse = ", "))
+    abort_argument(extras, must, "extras", call)
+  }
+  for (extra in extras) {
+    if (system_name() %in% unlist(strsplit(lock_entry(extra, "not for"), ", ", fixed = TRUE))) {
+      gym_abort(
+        c(
+          paste0("The extra \"", extra, "\" cannot be installed on this system (", system_name(),
+                 ")."),
+          i = "Its packages come ready to run for other systems only.",
+          i = paste("A server on another machine can have it: `create_GymClient()` takes that",
+                    "server's address.")
+        ),
+        class = "gym_error_install", call = call
+      )
+    }
+  }
+}
+
+# The name of this system in lock files.
+system_name <- function() {
+  info <- Sys.info()
+  machine <- lower_case(info[["machine"]])
+  machine <- switch(machine, amd64 = , "x86-64" = "x86_64", machine)
+  paste0(lower_case(info[["sysname"]]), "-", machine)
+}
+
+# The lock files are written by tools/lock: base.txt has the server's own packages, EXTRA.txt those
+# of an extra.
+lock_files <- function(extras) {
+  system.file("server", "lock", paste0(c("base", extras), ".txt"), package = "gym")
+}
+
+# Identifies the lock files. Line endings are ignored, because git and zip programs may change them.
+lock_hash <- function() {
+  lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
+  substr(hex(openssl::sha256(charToRaw(paste(lines, collapse = "\n")))), 1L, 12L)
+}
+
+hex <- function(hash) paste(unclass(hash), collapse = "")
+
+# The values of a "# key: value" at the top of the lock files.
+lock_entry <- function(extras, key) {
+  start <- paste0("# ", key, ": ")
+  vapply(lock_files(extras), function(path) {
+    lines <- readLines(path, n = 10L, warn = FALSE)
+    substring(lines[startsWith(lines, start)][[1L]], nchar(start) + 1L)
+  }, "", USE.NAMES = FALSE)
+}
 
 install_root <- function() cache_of("gym")
 
@@ -13,30 +69,6 @@ environment_folder <- function() file.path(install_root(), lock_hash())
 
 environment_python <- function(folder) {
   file.path(folder, "venv", if (is_windows()) "Scripts/python.exe" else "bin/python")
-}
-
-# The folders of all versions of the package, last used first.
-install_folders <- function() {
-  folders <- list.files(install_root(), "^[0-9a-f]{12}", full.names = TRUE)
-  folders[order(last_used(folders), decreasing = TRUE)]
-}
-
-last_used <- function(folders) {
-  pmax(file.mtime(folders), file.mtime(file.path(folders, "installed")), na.rm = TRUE)
-}
-
-make_folder <- function(folder, call) {
-  dir.create(folder, recursive = TRUE, showWarnings = FALSE)
-  if (!dir.exists(folder)) {
-    abort_install(
-      c(
-        paste0("The folder ", folder, " cannot be made."),
-        i = "Check that you can write there and that the disk is not full.",
-        i = "The environment variable R_USER_CACHE_DIR sets another place for it."
-      ),
-      call = call
-    )
-  }
 }
 
 #' Find the installed environment
@@ -52,17 +84,6 @@ installed_server <- function() {
   }
 }
 
-# The extras of the last installation, also by an earlier version of the package.
-earlier_extras <- function() {
-  for (folder in c(environment_folder(), install_folders())) {
-    extras <- read_extras(folder)
-    if (!is.null(extras)) {
-      return(intersect(extras, server_extras))
-    }
-  }
-  character()
-}
-
 # NULL for an incomplete folder.
 read_extras <- function(folder) {
   path <- file.path(folder, "installed")
@@ -72,18 +93,9 @@ read_extras <- function(folder) {
   }
 }
 
-write_extras <- function(folder, extras, call) {
-  path <- file.path(folder, "installed")
-  try(suppressWarnings(
-    writeLines(c(paste("Extras:", paste(extras, collapse = " ")), "End: yes"), path)
-  ), silent = TRUE)
-  if (!identical(read_extras(folder), extras)) {
-    abort_install(
-      c(paste0("The file ", path, " cannot be written."),
-        i = "Is the disk full? `gym_server_install()` continues from here."),
-      call = call
-    )
-  }
+write_extras <- function(folder, extras) {
+  writeLines(c(paste("Extras:", paste(extras, collapse = " ")), "End: yes"),
+             file.path(folder, "installed"))
 }
 
 is_installed_python <- function(python) {
@@ -100,10 +112,9 @@ use_python <- function(python) {
 }
 
 # Servers of other sessions, also on other machines with the same home, may run from another
-# version's environment. A killed session may have left a copy or a download.
+# version's environment.
 remove_old_folders <- function() {
-  folders <- list.files(install_root(), "^([0-9a-f]{12}|bundle-|download-)", full.names = TRUE)
-  others <- setdiff(folders, environment_folder())
-  old <- difftime(Sys.time(), last_used(others), units = "days") > 30
-  unlink(others[old], recursive = TRUE, force = TRUE)
+  manifests <- Sys.glob(file.path(install_root(), "*", "installed"))
+  old <- difftime(Sys.time(), file.mtime(manifests), units = "days") > 30
+  unlink(setdiff(dirname(manifests[old]), environment_folder()), recursive = TRUE, force = TRUE)
 }

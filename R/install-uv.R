@@ -1,4 +1,4 @@
-# Find uv, <https://docs.astral.sh/uv/>, or download it.
+# Find uv, <https://docs.astral.sh/uv/>, or fetch it; and run it.
 
 uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 
@@ -6,27 +6,23 @@ uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 least_uv <- "0.7.0"
 
 #' Find uv
-#' @param within The time in which all candidates must answer, in seconds, shared equally. `NULL`
-#'   gives each the time that a program may take on a busy machine.
 #' @return The path of the first one that runs and is new enough, or `NULL`.
 #' @noRd
-find_uv <- function(call = rlang::caller_env(), within = NULL) {
+find_uv <- function(call = rlang::caller_env(), timeout = 30) {
   named <- Sys.getenv("GYM_UV")
   if (!nzchar(named)) {
-    candidates <- uv_candidates()
-    timeout <- if (is.null(within)) 30 else within / max(1L, length(candidates))
-    return(Find(function(uv) uv_works(uv, timeout), candidates))
+    return(Find(function(uv) uv_works(uv, timeout), uv_candidates()))
   }
   uv <- path.expand(named)
   if (file.exists(uv)) uv <- absolute_path(uv)
-  if (!uv_works(uv, within %||% 30)) {
-    abort_install(
+  if (!uv_works(uv, timeout)) {
+    gym_abort(
       c(
         paste0("The variable GYM_UV names ", named, ", which is not a usable uv."),
         i = paste0("It must be the path of uv ", least_uv, " or newer."),
         i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for."
       ),
-      call = call
+      class = "gym_error_install", call = call
     )
   }
   uv
@@ -92,80 +88,63 @@ has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 
 pinned_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
-# Downloads uv and unpacks the archive if its checksum is right. UV_DOWNLOAD_URL is a variable of
+# Downloads uv, and unpacks the archive if its checksum is right. UV_DOWNLOAD_URL is a variable of
 # uv's own installer.
-install_uv <- function(call) {
-  target <- uv_target()
-  if (!target %in% names(uv_release$checksums)) {
-    abort_install(
-      c(paste0("There is no uv to download for this system (", target, ")."), i = without_uv()),
-      call = call
+fetch_uv <- function(call) {
+  fail <- function(...) {
+    gym_abort(
+      c(..., i = paste(
+        "uv can also be installed by hand (<https://docs.astral.sh/uv/>); or install the packages",
+        "into a Python 3.10 to 3.13, in a terminal for example by",
+        paste0("`", pip_install_server("python"), "`, and set GYM_PYTHON to that Python.")
+      )),
+      class = "gym_error_install", call = call
     )
   }
+  target <- uv_target()
+  if (!target %in% names(uv_release$checksums)) {
+    fail(paste0("There is no uv to download for this system (", target, ")."))
+  }
   # A folder of its own, because another session may download uv, too.
-  place <- tempfile("download-", install_root())
-  dir.create(place, recursive = TRUE, showWarnings = FALSE)
+  place <- temporary_file("gym-uv-")
+  dir.create(place)
   on.exit(unlink(place, recursive = TRUE))
   archive <- file.path(place, paste0("uv-", target, if (is_windows()) ".zip" else ".tar.gz"))
   base <- Sys.getenv(
     "UV_DOWNLOAD_URL",
     paste0("https://github.com/astral-sh/uv/releases/download/", uv_release$version)
   )
+  url <- paste0(sub("/+$", "", base), "/", basename(archive))
   cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
-  download_uv(paste0(sub("/+$", "", base), "/", basename(archive)), archive, call)
-  check_uv_archive(archive, uv_release$checksums[[target]], call)
-  unpack_uv(archive, call)
-}
-
-# Advice if uv is not available.
-without_uv <- function() {
-  paste(
-    "Without uv, install the packages into a Python 3.10 to 3.13 by other means, in a terminal",
-    "for example by", paste0("`", pip_install_server("python"), "`,"),
-    "and set GYM_PYTHON to that Python."
-  )
-}
-
-# Five times the size of its archive.
-most_bytes_of_uv <- 100e6
-
-download_uv <- function(url, archive, call) {
-  write_log(paste("> download", url))
   handle <- curl::new_handle()
-  set_curl(
-    handle, failonerror = TRUE, followlocation = TRUE, connecttimeout = 30,
-    # A download ends if it stays below this many bytes per second for so many seconds.
-    low_speed_limit = 100, low_speed_time = 60
-  )
+  # A download ends if it stays below this many bytes per second for so many seconds.
+  set_curl(handle, low_speed_limit = 100, low_speed_time = 60)
   certificates <- Sys.getenv("SSL_CERT_FILE")
-  if (nzchar(certificates)) {
-    set_curl(handle, cainfo = certificates)
-  }
-  file <- file(archive, "wb")
-  on.exit(close(file))
-  received <- 0
-  keep <- function(bytes) {
-    received <<- received + length(bytes)
-    if (received > most_bytes_of_uv) {
-      stop("The file is larger than ", most_bytes_of_uv / 1e6, " MB.", call. = FALSE)
-    }
-    writeBin(bytes, file)
-  }
+  if (nzchar(certificates)) set_curl(handle, cainfo = certificates)
   tryCatch(
-    # Today's curl also warns, with the address.
-    suppressWarnings(curl::curl_fetch_stream(url, keep, handle = handle)),
+    curl::curl_download(url, archive, handle = handle),
     error = function(cnd) {
-      write_log(conditionMessage(cnd))
-      abort_tool(
-        paste("uv could not be downloaded from", url), conditionMessage(cnd), call,
-        more = c(
-          paste("uv can also be installed by hand (<https://docs.astral.sh/uv/>):",
-                "`gym_server_install()` then finds it."),
-          without_uv()
-        )
-      )
+      reason <- without_passwords(conditionMessage(cnd))
+      fail(paste0("uv could not be downloaded from ", without_passwords(url), "."), x = reason,
+           install_advice(reason))
     }
   )
+  found <- file_sha256(archive)
+  if (found != uv_release$checksums[[target]]) {
+    fail(
+      "The downloaded uv is not the published one and was deleted.",
+      x = paste0("Its SHA-256 is ", found, " and should be ", uv_release$checksums[[target]], "."),
+      i = "A proxy may have replaced it: try again, or in another network."
+    )
+  }
+  unpack_uv(archive)
+  if (!uv_works(pinned_uv())) {
+    fail(
+      paste0("The downloaded uv cannot be run from ", dirname(pinned_uv()), "."),
+      i = "Is the disk full, or are programs not allowed to run from there?"
+    )
+  }
+  pinned_uv()
 }
 
 # Open the file as "rb": otherwise R would decompress it and hash its content.
@@ -175,22 +154,7 @@ file_sha256 <- function(path) {
   hex(openssl::sha256(bytes))
 }
 
-check_uv_archive <- function(archive, expected, call) {
-  found <- file_sha256(archive)
-  if (!identical(found, expected)) {
-    abort_install(
-      c(
-        "The downloaded uv is not the published one and was deleted.",
-        x = paste0("Its SHA-256 is ", found, " and should be ", expected, "."),
-        i = paste("A proxy may have replaced it, or the download broke off:",
-                  "try again, or in another network.")
-      ),
-      call = call
-    )
-  }
-}
-
-unpack_uv <- function(archive, call) {
+unpack_uv <- function(archive) {
   place <- dirname(archive)
   tryCatch(
     if (is_windows()) {
@@ -201,21 +165,100 @@ unpack_uv <- function(archive, call) {
     error = identity, warning = identity
   )
   unpacked <- list.files(place, paste0("^", uv_name(), "$"), recursive = TRUE, full.names = TRUE)
-  Sys.chmod(unpacked, "755")
-  works <- length(unpacked) && uv_works(unpacked[[1L]])
-  if (works) {
-    dir.create(dirname(pinned_uv()), recursive = TRUE, showWarnings = FALSE)
-    file.rename(unpacked[[1L]], pinned_uv())
-  }
-  if (!works || !file.exists(pinned_uv())) {
-    abort_install(
-      c(
-        paste("The downloaded uv cannot be run from", dirname(pinned_uv())),
-        i = "Is the disk full, or are programs not allowed to run from there?",
-        i = without_uv()
-      ),
-      call = call
-    )
-  }
-  pinned_uv()
+  dir.create(dirname(pinned_uv()), recursive = TRUE, showWarnings = FALSE)
+  file.copy(unpacked, pinned_uv(), overwrite = TRUE)
+  Sys.chmod(pinned_uv(), "755")
 }
+
+#' Run uv to its end
+#' @return A list: `failed`, and `text`, its output, a string.
+#' @noRd
+run_uv <- function(uv, arguments) {
+  pythons <- Sys.getenv("UV_PYTHON_INSTALL_DIR")
+  # Not the working directory, where a project may have settings for uv.
+  run <- run_quietly(uv, c("--directory", install_root(), arguments), timeout = Inf, env = c(
+    "current",
+    PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "", UV_NO_PROGRESS = "1", NO_COLOR = "1",
+    own_library_path(),
+    # uv's Pythons are beside the environments, so that they are removed together, and on Windows
+    # outside the roaming profile. No command is added to the PATH, no entry to the registry.
+    UV_PYTHON_INSTALL_DIR = if (nzchar(pythons)) pythons else file.path(install_root(), "python"),
+    UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0"
+  ))
+  list(failed = !identical(run$status, 0L),
+       text = without_passwords(paste0(run$stdout, run$stderr)))
+}
+
+# Raises an error with the lines of uv's message, or its last lines, and advice.
+abort_uv <- function(what, output, call, more = NULL) {
+  lines <- trimws(strsplit(output$text, "\r?\n")[[1L]])
+  lines <- lines[nzchar(lines)]
+  begins <- grep("^error\\b", lines, ignore.case = TRUE)
+  shown <- if (length(begins)) {
+    utils::head(lines[seq(begins[[1L]], length(lines))], 6L)
+  } else {
+    utils::tail(lines, 6L)
+  }
+  gym_abort(
+    c(
+      paste0(what, "."),
+      x = if (length(shown)) paste(shown, collapse = "\n"),
+      install_advice(output$text), more,
+      i = "What was downloaded is kept; `gym_server_install()` continues from here."
+    ),
+    class = "gym_error_install", output = lines, call = call
+  )
+}
+
+# Advice on the output of uv, curl or the system: that of the first entry whose words are in it.
+install_advice <- function(text) {
+  advice <- Find(function(entry) grepl(entry[[1L]], text, ignore.case = TRUE), install_advices)
+  if (!is.null(advice)) c(i = advice[[2L]])
+}
+
+install_advices <- list(
+  c(
+    "no space left|os error (28|112|122)\\b|errno (28|122)\\b|not enough space|quota exceeded",
+    paste("The disk is full. The variables R_USER_CACHE_DIR, TMPDIR and UV_CACHE_DIR set other",
+          "folders.")
+  ),
+  c(
+    "hash(es)? mismatch|mismatched hash",
+    paste("A downloaded file has the wrong hash and was refused. A proxy or mirror may have",
+          "changed it; try again, or in another network.")
+  ),
+  c(
+    "certificate|unknownissuer|ssl: |invalid peer|tls handshake|schannel",
+    paste("The network's certificate is not trusted, as behind a company's or university's proxy.",
+          "Set SSL_CERT_FILE to the file of that network's certificates, or UV_SYSTEM_CERTS=1",
+          "(UV_NATIVE_TLS=1 for an older uv) to use those of the system; `Sys.setenv()` sets them",
+          "for this session.")
+  ),
+  c(
+    "\\b407\\b|proxy|tunnel",
+    paste("The network's proxy did not let it through. HTTPS_PROXY must be its address, such as",
+          "\"http://user:password@proxy.example:8080\"; `Sys.setenv(HTTPS_PROXY = )` sets it for",
+          "this session.")
+  ),
+  c(
+    "permission denied|os error (5|13)\\b|access is denied|winerror 5\\b",
+    paste("A file or folder cannot be written; a virus scanner may hold it, or another user own",
+          "it. The variable R_USER_CACHE_DIR sets another cache folder.")
+  ),
+  c(
+    paste0("dns error|resolve|getaddrinfo|name resolution|timed? ?out|unreachable|connect|",
+           "error sending request|failed to (fetch|download)|forbidden|network connectivity"),
+    paste("The network is unavailable or blocks these files. Behind a proxy set HTTPS_PROXY to its",
+          "address, such as \"http://proxy.example:8080\".",
+          "`vignette(\"server\", package = \"gym\")` shows how to install without a network.")
+  ),
+  c(
+    paste0("no solution found|no (usable )?wheels?|not a supported wheel|",
+           "doesn't have a (source distribution or )?wheel"),
+    paste("A package does not fit this system or this Python. The server takes 64-bit Python 3.10",
+          "to 3.13.")
+  )
+)
+
+# The address of a mirror or a proxy may contain a password.
+without_passwords <- function(texts) gsub("://[^/[:space:]]+@", "://<login>@", texts)

@@ -26,15 +26,14 @@
 #'   `"atari"`, `"video"` and `"jax"` (600 MB). The default is none. Classic control and toy text
 #'   work without extras.
 #' @param ... Must be empty.
-#' @param offline A folder filled by [gym_server_bundle()] on another machine, a string, to install
-#'   without the network. `NULL`, the default, installs from the network.
+#' @param offline No longer used. `vignette("server")` shows how to install without a network.
 #' @param ask Ask first, showing the packages, the megabytes and the folder? By default `TRUE` in an
 #'   interactive session. In a script the call itself is consent.
 #' @return The path of the environment's Python, a string, invisibly. `NULL`, invisibly, if the
 #'   answer was no.
 #' @section Errors: `gym_error_install`, with advice, if the installation failed; an earlier
-#'   installation is kept. `gym_error_argument`.
-#' @seealso [gym_server_bundle()], [gym_client()]
+#'   installation is kept. `gym_error_defunct` for `offline`, `gym_error_argument`.
+#' @seealso [gym_client()]
 #' @export
 #' @examples
 #' # Asks in an interactive session:
@@ -43,94 +42,138 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
                                ask = rlang::is_interactive()) {
   check_extras(extras)
   check_dots_empty(...)
-  check_string(offline, allow_null = TRUE)
+  if (!is.null(offline)) abort_defunct(without_network, "`offline`")
   check_flag(ask)
   call <- rlang::current_env()
-  check_named_python(call)
-  wanted <- server_extras[server_extras %in% c(extras, earlier_extras())]
-  # A bundle that does not fit is an error even if it is not needed.
-  bundle <- if (!is.null(offline)) read_bundle(offline, wanted, call)
+  # Also by an earlier version of the package.
+  earlier <- lapply(list.dirs(install_root(), recursive = FALSE), read_extras)
+  wanted <- server_extras[server_extras %in% c(extras, unlist(earlier))]
   there <- installed_server()
-  if (has_all(there, wanted)) {
-    needed <- if (!is.null(bundle)) "; the bundle was not needed"
-    cli::cli_inform(c(v = "The server is installed already, in {.path {there$folder}}{needed}."))
-    remove_old_folders()
+  if (!is.null(there) && all(wanted %in% there$extras) &&
+        is.null(environment_problem(there$python))) {
+    cli::cli_inform(c(v = "The server is installed already, in {.path {there$folder}}."))
     return(invisible(there$python))
   }
-  plan <- install_plan(wanted, bundle, call)
-  if (ask && !confirm_install(plan)) {
+  uv <- find_uv(call)
+  # No by default: an empty line of a pasted script must not start a download.
+  if (ask && !ask_yes_no(install_question(wanted, uv), default = FALSE, call = call)) {
     return(invisible())
   }
-  python <- withCallingHandlers(install_environment(plan, call), interrupt = function(cnd) {
-    cli::cli_inform(c("!" = "Interrupted: {.code gym_server_install()} continues from here."))
-  })
-  inform_of_precedence(python)
+  dir.create(environment_folder(), recursive = TRUE, showWarnings = FALSE)
+  if (!dir.exists(environment_folder())) {
+    gym_abort(
+      c(
+        paste0("The folder ", environment_folder(), " cannot be made."),
+        i = "Check that you can write there and that the disk is not full.",
+        i = "The environment variable R_USER_CACHE_DIR sets another place for it."
+      ),
+      class = "gym_error_install"
+    )
+  }
+  python <- install_environment(wanted, uv %||% fetch_uv(call), call)
+  remove_old_folders()
+  cli::cli_inform(c(
+    v = "Installed in {.path {environment_folder()}}.",
+    "!" = if (nzchar(Sys.getenv("GYM_PYTHON"))) {
+      "GYM_PYTHON is set and used first; {.code Sys.unsetenv(\"GYM_PYTHON\")} ends that."
+    }
+  ))
   invisible(python)
 }
 
-# Whether an environment has the extras and its server can be imported.
-has_all <- function(there, extras) {
-  !is.null(there) && all(extras %in% there$extras) && !failed(try_environment(there$python, extras))
-}
+#' @rdname gym-defunct
+#' @export
+gym_server_bundle <- function(...) abort_defunct(without_network)
 
-# The Python in GYM_PYTHON is used before an installed one: if it cannot run the server, an
-# installation would not help.
-check_named_python <- function(call) {
-  named <- Sys.getenv("GYM_PYTHON")
-  if (!nzchar(named)) {
-    return(invisible())
-  }
-  about <- probe_python(path.expand(named))
-  if (isTRUE(about$fits)) {
-    return(invisible())
-  }
-  what <- if (is.null(about)) "which does not run" else paste0("which is Python ", about$version)
-  abort_install(
-    c(
-      paste0("The variable GYM_PYTHON names ", named, ", ", what, "."),
-      i = "The server needs 64-bit Python 3.10 to 3.13, and that Python is used first.",
-      i = paste("`Sys.unsetenv(\"GYM_PYTHON\")`, and the same in ~/.Renviron; then",
-                "`gym_server_install()` again.")
-    ),
-    call = call
-  )
-}
-
-# Asks a Python for its version and checks it against the lock files. Returns NULL for a Python that
-# does not run.
-probe_python <- function(python) {
-  output <- run_quietly(
-    python, c("-I", "-c", probe), timeout = 60, env = tool_environment()
-  )$stdout
-  words <- strsplit(trimws(output), " ", fixed = TRUE)[[1L]]
-  if (length(words) != 4L || words[[1L]] != "python") {
-    return(NULL)
-  }
-  version <- words[[2L]]
-  list(
-    version = version,
-    fits = version %in% c("3.10", "3.11", "3.12", "3.13") && words[[3L]] == "CPython" &&
-      words[[4L]] == "64"
-  )
-}
-
-# The code for probe_python(). Run it with -I, which every Python that the server supports has.
-probe <- paste(
-  "import platform, sys",
-  "print('python', '%d.%d' % sys.version_info[:2], platform.python_implementation(),",
-  "      64 if sys.maxsize > 2**32 else 32)",
-  sep = "\n"
+without_network <- paste(
+  "copy uv, its Pythons and its cache: see \"A classroom without a network\" in",
+  "`vignette(\"server\", package = \"gym\")`"
 )
 
-# Warns if this session will not use the new installation.
-inform_of_precedence <- function(python) {
-  named <- Sys.getenv("GYM_PYTHON")
-  if (nzchar(named) && !identical(path.expand(named), python)) {
-    cli::cli_inform(c(
-      "!" = "The variable GYM_PYTHON is set, and its Python is used first.",
-      " " = "{.code Sys.unsetenv(\"GYM_PYTHON\")} makes this session use the installed one."
+# The sizes of Python and uv are those on Linux with an Intel processor.
+install_question <- function(extras, uv) {
+  megabytes <- function(key, more) {
+    more + sum(as.numeric(sub(" MB", "", lock_entry(extras, key), fixed = TRUE)))
+  }
+  extras_text <- if (length(extras)) paste0(" (with ", toString(extras), ")")
+  paste(
+    "The server that plays the environments needs Python packages on this machine.",
+    paste0("What:  the games of Gymnasium", extras_text, ", a Python if none is there, by uv ",
+           uv %||% paste(uv_release$version, "(which is downloaded)")),
+    sprintf("Size:  at most %.0f MB to download, %.0f MB on the disk", megabytes("download", 55),
+            megabytes("disk", 150)),
+    paste("Where:", install_root()),
+    "Install them?",
+    sep = "\n"
+  )
+}
+
+# Sessions that install at the same time use the same folder: uv makes one wait for the other, which
+# then finds everything there.
+install_environment <- function(extras, uv, call) {
+  folder <- environment_folder()
+  python <- environment_python(folder)
+  cli::cli_inform(c(i = "Installing the server's packages. This can take some minutes."))
+  if (!has_venv(folder)) make_venv(uv, folder, call)
+  # Files may be missing from packages that uv considers installed.
+  for (repairs in list(NULL, "--reinstall")) {
+    output <- run_uv(uv, c(
+      "pip", "sync", "--python", python, "--require-hashes", "--no-build", repairs,
+      lock_files(extras)
+    ))
+    if (output$failed) abort_uv("The server's packages could not be installed", output, call)
+    problem <- environment_problem(python)
+    if (is.null(problem)) {
+      write_extras(folder, extras)
+      return(python)
+    }
+  }
+  output$text <- problem
+  abort_uv("The packages are installed, but the server cannot be run with them", output, call)
+}
+
+# Without pyvenv.cfg, uv would take this Python for the environment's base and install the packages
+# there.
+has_venv <- function(folder) {
+  code <- "import sys; print((3, 10) <= sys.version_info < (3, 14))"
+  file.exists(file.path(folder, "venv", "pyvenv.cfg")) &&
+    startsWith(run_quietly(environment_python(folder), c("-I", "-c", code))$stdout, "True")
+}
+
+# A Python that uv installs; on a network that blocks those, one of this machine.
+make_venv <- function(uv, folder, call) {
+  venv <- function(...) {
+    run_uv(uv, c("venv", "--allow-existing", ..., file.path(folder, "venv")))
+  }
+  if (nzchar(Sys.getenv("UV_PYTHON"))) {
+    output <- venv()
+  } else {
+    output <- venv("--managed-python", "--python", "3.12")
+    if (output$failed) {
+      other <- venv("--no-managed-python", "--no-python-downloads", "--python",
+                    "cpython>=3.10,<3.14")
+      if (!other$failed) output <- other
+    }
+  }
+  if (output$failed || !has_venv(folder)) {
+    abort_uv("uv could neither install nor find a Python for the server", output, call, c(
+      i = paste("Install a 64-bit Python 3.10 to 3.13 and call `gym_server_install()` again; or",
+                "set UV_PYTHON_INSTALL_MIRROR to a place from which uv can get its Pythons."),
+      i = if (nzchar(Sys.getenv("UV_PYTHON"))) "`Sys.unsetenv(\"UV_PYTHON\")` lets uv choose."
     ))
   }
+}
+
+# Why an environment is not as it was installed, a string, or NULL. Each installed file must be
+# there, and the server must run.
+environment_problem <- function(python) {
+  python_problem(python, before = paste(
+    "import csv, importlib.metadata as metadata, sysconfig",
+    "for package in metadata.distributions(path=[sysconfig.get_path('purelib')]):",
+    "    for file, *_ in csv.reader((package.read_text('RECORD') or '').splitlines()):",
+    "        if not package.locate_file(file).exists(): raise SystemExit(f'{file} is missing')\n",
+    sep = "\n"
+  ))
 }
 
 #' Install the server's Python environment if the user agrees

@@ -59,6 +59,24 @@ pip_install_server <- function(python) {
   paste(python, "-m pip install", quote_for_terminal(folder))
 }
 
+#' Find out whether a Python can run the server
+#'
+#' It imports the whole server and prints its version.
+#' @param timeout The time for that, in seconds.
+#' @param before Lines of Python to run first, a string.
+#' @return Why it cannot, a string, or `NULL`.
+#' @noRd
+python_problem <- function(python, timeout = 60, before = "") {
+  run <- run_quietly(
+    python, c("-c", paste0(before, run_server), "--version"), timeout, server_environment()
+  )
+  if (is.na(run$status)) {
+    return(paste0(not_started_reason(python), ", or does not answer in ", timeout, " s"))
+  }
+  # An empty file that is a program ends in order, too.
+  if (run$status != 0L || !nzchar(run$stdout)) refusal_reason(strsplit(run$stderr, "\n")[[1L]])
+}
+
 quote_for_terminal <- function(path) shQuote(path, if (is_windows()) "cmd" else "sh")
 
 # The Python that the user chose, or NULL.

@@ -21,10 +21,12 @@ search_landscape <- function(...) {
   abort_defunct("play `policy_candidates()` with weights around the best ones by `rollout()`")
 }
 
-abort_defunct <- function(replacement, call = rlang::caller_env()) {
+# `what`: what has ended, if not the function itself.
+abort_defunct <- function(replacement, what = NULL, call = rlang::caller_env()) {
   name <- as.character(rlang::error_call(call)[[1L]])
+  what <- what %||% paste0("`", name[length(name)], "()`")
   gym_abort(
-    c(paste0("`", name[length(name)], "()` has ended."), i = paste0("Instead, ", replacement, ".")),
+    c(paste(what, "has ended."), i = paste0("Instead, ", replacement, ".")),
     class = "gym_error_defunct", replacement = replacement, call = call
   )
 }

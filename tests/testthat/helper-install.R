@@ -28,11 +28,12 @@ skip_if_no_packages <- function() {
   testthat::skip_on_cran()
   skip_if_no_uv()
   dir.create(install_root(), recursive = TRUE, showWarnings = FALSE)
-  reached <- run_tool(Sys.getenv("GYM_UV"), c(
+  withr::local_envvar(UV_HTTP_TIMEOUT = "10")
+  reached <- run_uv(Sys.getenv("GYM_UV"), c(
     "pip", "install", "--no-cache", "--no-deps", "--target", withr::local_tempdir(),
     "--no-managed-python", "--python", "cpython>=3.10,<3.14", "blinker"
-  ), env = c(UV_HTTP_TIMEOUT = "10"))
-  testthat::skip_if(failed(reached), "no Python 3.10 to 3.13, or its package index is not reached")
+  ))
+  testthat::skip_if(reached$failed, "no Python 3.10 to 3.13, or its package index is not reached")
 }
 
 skip_if_no_uv <- function() {
@@ -40,13 +41,13 @@ skip_if_no_uv <- function() {
 }
 
 # An environment as an installation leaves it, but for what is in it.
-fake_installation <- function(extras = character(), hash = lock_hash(), ...) {
+fake_installation <- function(extras = character(), hash = lock_hash()) {
   # Never into the user's own cache.
   stopifnot(startsWith(install_root(), dirname(tempdir())), nzchar(Sys.getenv("R_USER_CACHE_DIR")))
   folder <- file.path(install_root(), hash)
-  fake_program(environment_python(folder), ...)
+  fake_program(environment_python(folder))
   writeLines("", file.path(folder, "venv", "pyvenv.cfg"))
-  write_extras(folder, extras, call = NULL)
+  write_extras(folder, extras)
   folder
 }
 

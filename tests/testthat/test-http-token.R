@@ -231,7 +231,7 @@ test_that("who is asked who listens is shown no token", {
   known <- probe_server(server$remote_base, timeout = 5, known_token(server$remote_base))
   expect_false(known$asks_token)
   withr::local_envvar(GYM_SERVER_URL = "http://127.0.0.1:1", GYM_SERVER_TOKEN = NA)
-  expect_match(sitrep_server(server$remote_base, "server", NULL)$finding, "environment")
+  expect_match(sitrep_server(server$remote_base, "server", NA)$finding, "environment")
 })
 
 test_that("calls without tokens are kept as they are", {

@@ -10,7 +10,6 @@ test_that("an environment is found when it is whole, and by no other lock", {
   unlink(folder, recursive = TRUE)
   fake_installation("atari", hash = "0123456789ab")
   expect_null(installed_server())
-  expect_identical(earlier_extras(), "atari")
 })
 
 test_that("what was interrupted or damaged is no environment", {
@@ -25,7 +24,6 @@ test_that("what was interrupted or damaged is no environment", {
   expect_null(installed_server())
   unlink(file.path(folder, "installed"))
   expect_null(installed_server())
-  expect_identical(earlier_extras(), character())
 })
 
 test_that("only what another version left and nobody used for a month is removed", {
@@ -33,18 +31,13 @@ test_that("only what another version left and nobody used for a month is removed
   own <- fake_installation()
   unused <- fake_installation("box2d", hash = "0123456789aa")
   used <- fake_installation("atari", hash = "0123456789ab")
-  half <- file.path(install_root(), c("0123456789ac", "bundle-1", "download-1"))
-  invisible(lapply(half, dir.create))
-  for (path in c(own, unused, used, half, file.path(c(own, unused, used), "installed"))) {
+  for (path in file.path(c(own, unused, used), "installed")) {
     Sys.setFileTime(path, Sys.time() - 31 * 86400)
   }
   # As when a server starts.
   use_python(environment_python(used))
   remove_old_folders()
   expect_identical(dir.exists(c(own, unused, used)), c(TRUE, FALSE, TRUE))
-  expect_false(any(dir.exists(half)))
-  expect_identical(install_folders()[[1L]], used)
-  expect_true(file.exists(environment_python(used)))
 })
 
 test_that("the cache folder's path is whole, also before it exists", {
@@ -57,24 +50,45 @@ test_that("the cache folder's path is whole, also before it exists", {
   expect_identical(install_root(), file.path(getwd(), "here", "R", "gym"))
   expect_false(dir.exists("here"))
   expect_identical(absolute_path("C:/x"), "C:/x")
-  # A tool writes where R looks.
-  dir.create(install_root(), recursive = TRUE)
-  run_tool("/bin/sh", c("-c", "echo x > \"$0\"", file.path(install_root(), "x")))
-  expect_true(file.exists(file.path(home, "here", "R", "gym", "x")))
-})
-
-test_that("a cache folder that cannot be made is an error that says what to set", {
-  local_cache()
-  skip_if_no_uv()
-  file <- withr::local_tempfile(lines = "not a folder")
-  withr::local_envvar(R_USER_CACHE_DIR = file)
-  expect_error(gym_server_install(), "R_USER_CACHE_DIR", class = "gym_error_install")
-  expect_error(
-    gym_server_bundle(withr::local_tempdir()), "R_USER_CACHE_DIR", class = "gym_error_install"
-  )
 })
 
 test_that("tests see nothing of what the user has installed", {
   expect_true(startsWith(install_root(), paste0(tempdir(), "/gym-cache-")))
   expect_null(installed_server())
+})
+
+test_that("every part is locked, each package with its hashes", {
+  for (path in lock_files(server_extras)) {
+    lines <- readLines(path)
+    pinned <- grep("==", lines, fixed = TRUE)
+    expect_true(all(grepl("^[a-z0-9-]+==[0-9][^ ]*( ; [^\\\\]+)? \\\\$", lines[pinned])))
+    expect_true(all(grepl("^    --hash=sha256:[0-9a-f]{64}( \\\\)?$", lines[pinned + 1L])))
+  }
+  expect_lt(sum(file.size(lock_files(server_extras))), 1e6)
+})
+
+test_that("the lock's hash does not depend on the ends of lines", {
+  hash <- lock_hash()
+  expect_match(hash, "^[0-9a-f]{12}$")
+  folder <- withr::local_tempdir()
+  for (path in lock_files(server_extras)) {
+    con <- file(file.path(folder, basename(path)), "wb")
+    writeLines(readLines(path), con, sep = "\r\n")
+    close(con)
+  }
+  copies <- file.path(folder, basename(lock_files(server_extras)))
+  local_binding("lock_files", function(extras) copies)
+  expect_identical(lock_hash(), hash)
+  cat("one more\n", file = copies[[3L]], append = TRUE)
+  expect_false(lock_hash() == hash)
+})
+
+test_that("extras are checked", {
+  expect_error(check_extras("box3d"), "box2d", class = "gym_error_argument")
+  expect_error(check_extras(NA_character_), class = "gym_error_argument")
+  expect_error(check_extras(1), class = "gym_error_argument")
+  local_binding("system_name", function() "linux-aarch64")
+  expect_error(check_extras("box2d"), "cannot be installed on this system",
+               class = "gym_error_install")
+  expect_error(check_extras("mujoco"), NA)
 })

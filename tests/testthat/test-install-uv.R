@@ -42,43 +42,6 @@ test_that("uv is looked for in the order of the help page", {
   expect_false("managed" %in% uv_candidates())
 })
 
-test_that("one that hangs is passed over, and all are asked within the limit", {
-  skip_on_os("windows")
-  local_cache()
-  folder <- withr::local_tempdir()
-  hangs <- fake_program(file.path(folder, "hangs", "uv"), "sleep 60")
-  local_binding("uv_candidates", function() c(hangs, fake_uv(file.path(folder, "works"))))
-  limits <- numeric()
-  local_binding("uv_works", function(uv, timeout) {
-    limits <<- c(limits, timeout)
-    uv != hangs
-  })
-  withr::local_envvar(GYM_UV = NA)
-  expect_identical(find_uv(within = 3), file.path(folder, "works", "uv"))
-  expect_equal(sum(limits), 3)
-  find_uv()
-  expect_equal(limits[3:4], c(30, 30))
-})
-
-test_that("gym_sitrep() soon reports a uv that does not answer", {
-  skip_on_os("windows")
-  local_cache()
-  folder <- withr::local_tempdir()
-  hangs <- fake_program(file.path(folder, "uv"), "sleep 60")
-  local_binding("uv_candidates", function() hangs)
-  withr::local_envvar(GYM_UV = NA)
-  asked <- NULL
-  real <- run_quietly
-  local_binding("run_quietly", function(command, arguments, timeout = 30, ...) {
-    asked <<- timeout
-    real(command, arguments, 0.5, ...)
-  })
-  row <- sitrep_uv()
-  expect_match(row$finding, paste(hangs, "cannot be used"), fixed = TRUE)
-  expect_identical(row$state, "note")
-  expect_equal(asked, 3)
-})
-
 test_that("a relative path of uv is that of this folder, wherever uv is run", {
   skip_on_os("windows")
   local_cache()
@@ -112,7 +75,7 @@ test_that("the pinned uv has a checksum for each system, and this system a name"
     expect_true(uv_target() %in% names(uv_release$checksums))
   }
   local_binding("system_name", function() "sunos-sparc")
-  expect_error(install_uv(NULL), "GYM_PYTHON to that Python", class = "gym_error_install")
+  expect_error(fetch_uv(NULL), "GYM_PYTHON to that Python", class = "gym_error_install")
 })
 
 test_that("uv is downloaded, and run only when its checksum is right", {
@@ -121,9 +84,8 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   folder <- withr::local_tempdir()
   uv <- fake_uv(folder)
   archive <- local_release(uv)
-  expect_message(pinned <- install_uv(NULL), "Downloading uv")
+  expect_message(pinned <- fetch_uv(NULL), "Downloading uv")
   expect_identical(pinned, pinned_uv())
-  expect_true(uv_works(pinned))
   expect_identical(list.files(dirname(pinned)), "uv")
   local_binding("uv_candidates", function() pinned)
   withr::local_envvar(GYM_UV = NA)
@@ -131,7 +93,7 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   # What does not run any more is downloaded anew.
   writeLines(character(), pinned)
   expect_null(find_uv())
-  expect_message(install_uv(NULL), "Downloading uv")
+  suppressMessages(fetch_uv(NULL))
   expect_true(uv_works(pinned))
 
   unlink(dirname(pinned), recursive = TRUE)
@@ -141,44 +103,75 @@ test_that("uv is downloaded, and run only when its checksum is right", {
   local_release(uv)
   # The archive is another than the one whose checksum is known.
   local_binding("uv_release", right)
-  expect_error(suppressMessages(install_uv(NULL)), "SHA-256", class = "gym_error_install")
+  expect_error(suppressMessages(fetch_uv(NULL)), "SHA-256", class = "gym_error_install")
   expect_false(file.exists(ran))
-  expect_identical(list.files(install_root(), recursive = TRUE), "install.log")
-  # A second try, with the right one.
-  withr::local_envvar(UV_DOWNLOAD_URL = paste0("file://", dirname(archive)))
-  expect_identical(suppressMessages(install_uv(NULL)), pinned)
+  expect_false(file.exists(pinned))
 })
 
-test_that("a download that fails says what else can be done", {
+test_that("a download that fails says what else can be done, and shows no password", {
   local_cache()
-  dir.create(install_root(), recursive = TRUE)
-  withr::local_envvar(UV_DOWNLOAD_URL = "http://127.0.0.1:9")
-  error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
-  expect_match(conditionMessage(error), "HTTPS_PROXY", fixed = TRUE)
-  expect_match(conditionMessage(error), "by hand", fixed = TRUE)
-  expect_match(conditionMessage(error), "-m pip install '?/.*/server'?`, and set GYM_PYTHON to")
-})
-
-test_that("a download shows no password, and is not larger than it may be", {
-  local_cache()
-  dir.create(install_root(), recursive = TRUE)
   withr::local_envvar(UV_DOWNLOAD_URL = "http://me:secret@127.0.0.1:9")
-  error <- expect_error(suppressMessages(install_uv(NULL)), class = "gym_error_install")
-  expect_match(conditionMessage(error), "http://<login>@127.0.0.1:9/", fixed = TRUE)
-  shown <- c(unlist(error), readLines(install_log()))
-  expect_false(any(grepl("secret", shown, fixed = TRUE)))
-  local_binding("most_bytes_of_uv", 1000)
-  archive <- withr::local_tempfile(lines = strrep("x", 5000))
-  expect_error(
-    download_uv(paste0("file://", archive), withr::local_tempfile(), NULL), "larger than 0.001 MB",
-    class = "gym_error_install"
-  )
+  error <- expect_error(suppressMessages(fetch_uv(NULL)), class = "gym_error_install")
+  message <- conditionMessage(error)
+  expect_match(message, "http://<login>@127.0.0.1:9/", fixed = TRUE)
+  expect_match(message, "HTTPS_PROXY", fixed = TRUE)
+  expect_match(message, "by hand", fixed = TRUE)
+  expect_match(message, "-m pip install '?/.*/server'?`, and set GYM_PYTHON to")
+  expect_false(any(grepl("secret", unlist(error), fixed = TRUE)))
 })
 
 test_that("an archive without a uv that runs is refused", {
   skip_on_os("windows")
   local_cache()
   local_release(withr::local_tempfile(lines = "not a program"))
-  expect_error(suppressMessages(install_uv(NULL)), "cannot be run", class = "gym_error_install")
-  expect_false(file.exists(pinned_uv()))
+  expect_error(suppressMessages(fetch_uv(NULL)), "cannot be run", class = "gym_error_install")
+})
+
+test_that("uv gets nothing of another Python's, and shows no password", {
+  local_cache()
+  dir.create(install_root(), recursive = TRUE)
+  withr::local_envvar(PYTHONPATH = "/else", PYTHONHOME = "/else", VIRTUAL_ENV = "/else")
+  uv <- local_fake_uv("echo \"<$PYTHONPATH$PYTHONHOME$VIRTUAL_ENV> $UV_PYTHON_INSTALL_DIR\"",
+                      "echo https://me:secret@index.example >&2; exit 3")
+  output <- run_uv(uv, "x")
+  expect_true(output$failed)
+  expect_identical(output$text, paste0("<> ", install_root(),
+                                       "/python\nhttps://<login>@index.example\n"))
+  expect_true(run_uv("/no/such/tool", "x")$failed)
+})
+
+test_that("a failure says what to do, with the lines that name it", {
+  advice <- function(...) install_advice(paste(c(...), collapse = "\n"))
+  # The words are those of uv 0.13.9.
+  expect_match(advice(
+    "error: Failed to install: numpy-2.5.5-cp312-cp312-manylinux_2_28_x86_64.whl (numpy==2.5.5)",
+    "cause: failed to copy file: No space left on device (os error 28)"
+  ), "disk is full")
+  expect_match(advice(
+    "error: Failed to fetch: `https://index.example/simple/blinker/`",
+    "cause: client error (Connect)", "cause: invalid peer certificate: UnknownIssuer"
+  ), "SSL_CERT_FILE")
+  expect_match(advice(
+    "cause: tunnel error: failed to create underlying connection", "cause: tcp connect error"
+  ), "HTTPS_PROXY")
+  expect_match(advice(
+    "cause: dns error", "cause: failed to lookup address information: Name or service not known"
+  ), "without a network")
+  expect_match(advice(
+    "error: No solution found when resolving dependencies:",
+    "cause: Because numpy==2.5.5 has no wheels with a matching Python ABI tag (e.g., `cp39`)"
+  ), "Python 3.10")
+  expect_match(advice(
+    "error: Hash mismatch for `blinker==1.9.0`", "Expected:", "  sha256:0", "Computed:"
+  ), "refused")
+  expect_null(advice("something else"))
+
+  refusal <- function(...) {
+    text <- paste(c(...), collapse = "\n")
+    expect_error(abort_uv("It failed", list(text = text), NULL), class = "gym_error_install")
+  }
+  error <- refusal("Resolved 14 packages", "error: Failed to fetch", "cause: dns error", "")
+  expect_match(conditionMessage(error), "It failed[.]\n. error: Failed to fetch\ncause: dns")
+  expect_identical(error$output[[1L]], "Resolved 14 packages")
+  expect_match(conditionMessage(refusal(letters)), "u\nv\nw\nx\ny\nz\n", fixed = TRUE)
 })

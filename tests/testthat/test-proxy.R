@@ -134,6 +134,6 @@ test_that("a proxy whose server is gone is distinguished from one that is no Gym
   gym_server_stop(server)
   expect_error(env_list(client), "behind it does not answer", class = "gym_error_http_502")
   withr::local_options(httr_config = proxy$config)
-  found <- sitrep_server(proxy$url, "server", NULL)
+  found <- sitrep_server(proxy$url, "server", NA)
   expect_match(found$finding, "behind it does not answer")
 })

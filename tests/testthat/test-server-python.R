@@ -32,3 +32,22 @@ test_that("the stand-in for Python of macOS without developer tools is left alon
   local_binding("lacks_developer_tools", function() TRUE)
   expect_false(any(startsWith(python_candidates(), "/usr/bin/")))
 })
+
+test_that("a Python that cannot run the server says why", {
+  skip_on_os("windows")
+  folder <- withr::local_tempdir()
+  problem <- function(...) python_problem(fake_program(file.path(folder, "python3"), ...), 20)
+  set.seed(1)
+  before <- .Random.seed
+  expect_null(python_problem(working_python()))
+  expect_identical(.Random.seed, before)
+  expect_identical(problem(
+    "echo \"gym_server cannot run on this Python (3.12.1, /x (y)): No module named 'flask'\" >&2",
+    "exit 78"
+  ), "No module named 'flask'")
+  expect_identical(problem("exit 1"), "it ended without output")
+  expect_identical(problem("exit 0"), "it ended without output")
+  expect_match(python_problem("/no/such/python"), "there is no such file")
+  hanging <- fake_program(file.path(folder, "hanging"), "exec sleep 60")
+  expect_match(python_problem(hanging, timeout = 0.5), "does not answer in 0.5 s")
+})

@@ -1,17 +1,15 @@
 # A report of a session of which all that takes time is known.
-report <- function(runs = TRUE, reason = NA_character_, frame = parent.frame()) {
+report <- function(problem = NULL, frame = parent.frame()) {
   local_functions(
     python_candidates = function(python = NULL) python %||% "/some/python3",
-    try_pythons = function(...) {
-      data.frame(python = "/some/python3", version = "3.12.1", runs = runs, reason = reason,
-                 extras = "box2d, video")
-    },
+    python_problem = function(...) problem,
     installed_server = function() NULL,
-    install_folders = function() character(),
     find_uv = function(...) NULL,
     frame = frame
   )
-  withr::local_envvar(GYM_PYTHON = NA, GYM_SERVER_URL = NA, .local_envir = frame)
+  withr::local_envvar(GYM_PYTHON = NA, GYM_SERVER_URL = NA,
+                      R_USER_CACHE_DIR = withr::local_tempdir(.local_envir = frame),
+                      .local_envir = frame)
   local_session(servers = list(), client = NULL, frame = frame)
 }
 
@@ -29,17 +27,16 @@ test_that("where all is well the report says so on one screen", {
   expect_false(any(seen$found$state == "wrong"))
   expect_lte(length(seen$lines), 25)
   expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
-  expect_match(seen$text, "/some/python3 (3.12.1): runs the server (extras: box2d, video)",
-               fixed = TRUE)
+  expect_match(seen$text, "/some/python3: runs the server", fixed = TRUE)
   expect_match(seen$text, paste0("gym: ", packageVersion("gym")), fixed = TRUE)
   expect_identical(capture.output(print(seen$found)), seen$lines)
 })
 
 test_that("without a Python the report names the call that fixes it", {
-  report(runs = FALSE, reason = "No module named 'flask'")
+  report("No module named 'flask'")
   seen <- sitrep()
   wrong <- seen$found[seen$found$state == "wrong", ]
-  expect_identical(wrong$what, "environment")
+  expect_identical(wrong$what, "Python")
   expect_identical(wrong$fix, "gym_server_install()")
   expect_match(seen$text, "No module named 'flask'", fixed = TRUE)
   expect_match(seen$text, "1 thing is wrong", fixed = TRUE)
@@ -47,7 +44,7 @@ test_that("without a Python the report names the call that fixes it", {
 
 test_that("a session that plays on another machine needs no Python", {
   url <- local_server(token = FALSE)$remote_base
-  report(runs = FALSE, reason = "No module named 'flask'")
+  report("No module named 'flask'")
   withr::local_envvar(GYM_SERVER_URL = url)
   seen <- sitrep()
   expect_match(seen$text, "Nothing is wrong", fixed = TRUE)
@@ -55,7 +52,7 @@ test_that("a session that plays on another machine needs no Python", {
 })
 
 test_that("a Python that GYM_PYTHON names and that cannot run the server is wrong", {
-  report(runs = FALSE, reason = "Python 3.10 or newer is needed")
+  report("Python 3.10 or newer is needed")
   withr::local_envvar(GYM_PYTHON = "/some/python3")
   found <- sitrep()$found
   row <- found[startsWith(found$what, "/some/python3"), ]
@@ -63,39 +60,31 @@ test_that("a Python that GYM_PYTHON names and that cannot run the server is wron
   expect_identical(row$fix, "Sys.unsetenv(\"GYM_PYTHON\")")
 })
 
-test_that("the installed environment is reported: complete, damaged, or of another version", {
+test_that("the installed environment is reported: complete or damaged", {
   report()
-  folder <- withr::local_tempdir()
-  writeBin(raw(3e6), file.path(folder, "x"))
-  local_functions(
-    installed_server = function() list(python = "p", folder = folder, extras = "box2d"),
-    lock_hash = function() "abc"
-  )
   environment_row <- function() {
     found <- sitrep()$found
     found[found$what == "environment", ]
   }
-  expect_match(environment_row()$finding, "extras: box2d; 3 MB", fixed = TRUE)
-  expect_identical(environment_row()$state, "ok")
-  local_functions(
-    installed_server = function() NULL,
-    install_folders = function() c("/c/0ff", file.path(install_root(), "abc"))
-  )
+  expect_identical(environment_row()$state, "note")
+  dir.create(environment_folder(), recursive = TRUE)
   expect_match(environment_row()$finding, "damaged")
-  expect_identical(environment_row()$state, "wrong")
-  local_functions(install_folders = function() "/c/0ff")
-  expect_match(environment_row()$finding, "another version")
+  expect_identical(environment_row()$fix, "gym_server_install()")
+  local_functions(
+    installed_server = function() list(python = "p", folder = "/some", extras = "box2d")
+  )
+  expect_identical(environment_row()$finding, "/some (extras: box2d)")
 })
 
 test_that("an installed Python that cannot run the server is wrong", {
-  report(runs = FALSE, reason = "RuntimeError: damaged by hand")
-  local_functions(
-    installed_server = function() list(python = "/some/python3", folder = "/some", extras = NULL)
-  )
+  report("RuntimeError: damaged by hand")
+  python <- file.path(install_root(), "0ff", "bin", "python")
+  local_functions(python_candidates = function(...) python)
   found <- sitrep()$found
-  row <- found[startsWith(found$what, "/some/python3"), ]
+  row <- found[startsWith(found$what, python), ]
   expect_identical(row$state, "wrong")
   expect_identical(row$fix, "gym_server_install()")
+  expect_identical(sum(found$state == "wrong"), 1L)
 })
 
 test_that("the session's server is reported with its environments, also when it died", {
@@ -147,15 +136,11 @@ test_that("what goes wrong in finding out is a finding", {
   report()
   local_functions(
     find_uv = function(...) gym_abort("GYM_UV names no uv.", class = "gym_error_install"),
-    install_folders = function() stop("the disk is gone")
+    environment_folder = function() stop("the disk is gone"),
+    python_problem = function(...) stop("no processes")
   )
   seen <- sitrep()
   expect_match(seen$text, "the disk is gone", fixed = TRUE)
-  local_functions(
-    install_folders = function() character(),
-    try_pythons = function(...) stop("no processes")
-  )
-  seen <- sitrep()
   expect_match(seen$text, "no processes", fixed = TRUE)
   expect_match(seen$text, "GYM_UV names no uv", fixed = TRUE)
 })
@@ -180,7 +165,7 @@ test_that("the real report asks nothing, changes nothing and takes no server", {
 
 test_that("what could not be found out is wrong", {
   report()
-  local_functions(sitrep_own_servers = function() stop("Unknown option: timeout_ms"))
+  local_functions(sitrep_own_servers = function(...) stop("Unknown option: timeout_ms"))
   seen <- sitrep()
   expect_match(seen$text, "could not be determined: Unknown option", fixed = TRUE)
   expect_no_match(seen$text, "Nothing is wrong", fixed = TRUE)

@@ -56,7 +56,7 @@ test_that("on Windows the archive of uv is a zip file", {
                         error_on_status = FALSE)
   skip_if_not(made$status == 0L, "there is no Python that packs a zip file")
   local_windows()
-  unpack_uv(archive, NULL)
+  unpack_uv(archive)
   expect_true(file.exists(pinned_uv()))
   expect_identical(basename(pinned_uv()), "uv.exe")
 })

@@ -20,10 +20,9 @@ test_that("finding out what there is leaves R's generator as it was", {
   set.seed(1)
   before <- .Random.seed
   find_uv()
-  probe_python("/bin/sh")
+  python_problem("/bin/sh")
   own_library_path()
   python_candidates()
-  tool_environment()
   expect_identical(.Random.seed, before)
 })
 
@@ -33,11 +32,11 @@ test_that("the end of one process is not that of others", {
   folder <- withr::local_tempdir()
   trials <- lapply(1:2, function(i) {
     set.seed(1)
-    begin_trial(fake_program(file.path(folder, i), "exec sleep 60"))
+    start_python(fake_program(file.path(folder, i), "exec sleep 60"), character())
   })
-  trials[[1L]]$process$kill_tree()
-  expect_true(trials[[2L]]$process$is_alive())
-  trials[[2L]]$process$kill_tree()
+  trials[[1L]]$kill_tree()
+  expect_true(trials[[2L]]$is_alive())
+  trials[[2L]]$kill_tree()
 
   set.seed(1)
   server <- local_server()
