@@ -3,7 +3,7 @@ test_that("values that are drawn belong to their space and come back through JSO
   skip_if_not_installed("bit64")
   withr::local_seed(4)
   tried <- 0L
-  for (i in 1:400) {
+  for (i in 1:150) {
     space <- new_space(random_description())
     for (j in 1:3) {
       value <- space_sample(space)
@@ -14,7 +14,7 @@ test_that("values that are drawn belong to their space and come back through JSO
       tried <- tried + 1L
     }
   }
-  expect_identical(tried, 1200L)
+  expect_identical(tried, 450L)
 })
 
 test_that("values that are drawn come back through tensors", {
@@ -22,7 +22,7 @@ test_that("values that are drawn come back through tensors", {
   skip_if_not_installed("bit64")
   withr::local_seed(5)
   tried <- 0L
-  while (tried < 400L) {
+  while (tried < 200L) {
     space <- new_space(random_description())
     if (!has_tensors(space)) next
     value <- space_sample(space)

