@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
+from functools import cache, cached_property, singledispatch
 from typing import Any, Protocol
 
 import numpy as np
@@ -45,6 +45,7 @@ def read_bit(value: object) -> bool:
     return bool(value)
 
 
+@cache
 def reader_of(dtype: np.dtype) -> Callable[[object], object]:
     """Return the function that reads one array element of a dtype from JSON.
 
@@ -148,11 +149,10 @@ def read_array(
         NotInSpace: the value does not fit; with the path to the first element that does not.
     """
     is_bare = space.shape == (1,) and not isinstance(value, list)
+    nested = [value] if is_bare else value
     shape: tuple[int, ...] = ()
     try:
-        elements = _each(
-            space, read_element, [value] if is_bare else value, max(len(space.shape), 1)
-        )
+        elements = _each(space, read_element, nested, max(len(space.shape), 1))
         array = _array(elements, space.dtype)
         shape = array.shape
         if shape != space.shape and shape != (int(np.prod(space.shape)),):
