@@ -134,7 +134,9 @@ end_of_named <- function(client, instance_id) {
 
 check_not_ended <- function(client, instance_id, call = rlang::caller_env()) {
   ended <- end_of_named(client, instance_id)
-  if (!is.null(ended)) abort_closed("`env_create()` makes a new one.", call, paste("made", ended))
+  if (!is.null(ended)) {
+    abort_closed("`env_create()` makes a new one.", call, paste("made", ended), client)
+  }
 }
 
 # Makes an instance from the server's description, after creating it or on request.

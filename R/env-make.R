@@ -352,15 +352,22 @@ format.gym_env <- function(x, ...) {
 check_open <- function(env, call = rlang::caller_env()) {
   if (!env$is_open) {
     hint <- paste0("`gym_make(\"", env$spec$id, "\")` makes a new one.")
-    abort_closed(hint, call, end_text(env))
+    abort_closed(hint, call, end_text(env), env$client)
   }
 }
 
-abort_closed <- function(hint, call, end = "closed") {
+# `end` is how it ended, and `client` that of a server that may have ended with it.
+abort_closed <- function(hint, call, end = "closed", client = NULL) {
+  closed <- end == "closed"
   gym_abort(
-    c(paste0("This environment was ", end, "."), i = hint),
-    # One that ended with its server is an answer that did not come, too.
-    class = c(if (end != "closed") "gym_error_connection", "gym_error_argument"),
-    argument = "env", call = call
+    c(
+      paste0("This environment was ", end, "."),
+      if (!closed) end_bullets(client$remote_base),
+      i = hint
+    ),
+    # To use one that was closed is a mistake; one that ended with its server is an answer that did
+    # not come.
+    class = if (closed) "gym_error_argument" else "gym_error_connection",
+    argument = if (closed) "env", call = call
   )
 }

@@ -66,17 +66,38 @@ sentence <- function(text) {
 abort_connection <- function(url, reason, call, reached = TRUE) {
   base <- base_of(url)
   hangs <- reached && grepl("timed out|timeout", reason, ignore.case = TRUE)
+  lost <- environments_on(base)
   gym_abort(
-    c(
-      paste0("No answer from the server at ", base, "."),
-      x = reason,
-      i = if (hangs) hanging_hint(base) else connection_hint(base, reason)
-    ),
+    if (!hangs && own_server_ended(base)) {
+      c(
+        paste0("The server at ", base, " has ended."),
+        end_bullets(base),
+        i = "`gym_make()` starts another; `gym_server_log()` has the log of this one."
+      )
+    } else {
+      c(
+        paste0("No answer from the server at ", base, "."),
+        x = reason,
+        i = if (hangs) hanging_hint(base) else connection_hint(base, reason),
+        i = if (!hangs && !is.null(lost)) paste0("If it has ended, these are lost: ", lost, ".")
+      )
+    },
     class = "gym_error_connection",
     url = base,
     reached = reached,
     call = call
   )
+}
+
+# Whether the server of a connection that broke has ended, if it is one of this session. Its end is
+# seen a moment after the connection's.
+own_server_ended <- function(base) {
+  process <- the_session$servers[[base]]$process
+  if (is.null(process) || Sys.getpid() != the_session$pid) {
+    return(FALSE)
+  }
+  await_end(process, 1)
+  !process$is_alive()
 }
 
 hanging_hint <- function(base) {
@@ -97,15 +118,8 @@ connection_hint <- function(base, reason) {
       "`httr::set_config(httr::config(cainfo = \"FILE\"))` adds your own."
     ))
   }
-  server <- the_session$servers[[base]]
-  if (!is.null(server)) {
-    return(if (server$process$is_alive()) {
-      paste("This session started it; see `gym_server_log()`. If it has ended, `gym_make()` starts",
-            "another.")
-    } else {
-      paste("It has ended, and its environments with it. `gym_server_log()` has its last lines,",
-            "`gym_make()` starts another.")
-    })
+  if (!is.null(the_session$servers[[base]])) {
+    return("This session started it; see `gym_server_log()`.")
   }
   place <- local_place(base)
   if (is.null(place)) {

@@ -47,7 +47,10 @@ create_once <- function(client, state, fields, call) {
   check_instance_id(answer$instance_id)
   suspendInterrupts({
     note_protocol(state, answer)
-    remember_instance(instance_place(client, answer$instance_id), client, answer$instance_id)
+    remember_instance(
+      instance_place(client, answer$instance_id), client, answer$instance_id,
+      env_id = shown_line(answer$env_id)
+    )
     outcome <- "created"
   })
   answer
@@ -74,9 +77,11 @@ end_creation <- function(state, place, outcome) {
 instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
 
 # `body` is that of a creation that has no answer yet.
-remember_instance <- function(place, client, instance_id = NULL, body = NULL) {
+remember_instance <- function(place, client, instance_id = NULL, body = NULL, env_id = NULL) {
   assign(
-    place, list(client = client, pid = Sys.getpid(), instance_id = instance_id, body = body),
+    place,
+    list(client = client, pid = Sys.getpid(), instance_id = instance_id, body = body,
+         env_id = env_id),
     envir = the_session$instances
   )
 }
@@ -87,10 +92,32 @@ forget_instance <- function(place) {
   }
 }
 
-# Forgets all instances of a server that has ended.
+places_on <- function(base) {
+  places <- ls(the_session$instances, all.names = TRUE)
+  places[startsWith(places, paste0(base, " "))]
+}
+
+# Forgets all instances of a server that was stopped.
 forget_instances_of <- function(base) {
-  places <- ls(the_session$instances, all.names = TRUE, sorted = FALSE)
-  rm(list = places[startsWith(places, paste0(base, " "))], envir = the_session$instances)
+  rm(list = places_on(base), envir = the_session$instances)
+}
+
+# The environments of this session on a server, for a message; `NULL` if there are none.
+environments_on <- function(base) {
+  names <- vapply(mget(places_on(base), the_session$instances), function(entry) {
+    paste0(entry$env_id, " (", entry$instance_id, ")")
+  }, "")
+  if (length(names)) few_names(unname(names))
+}
+
+# Why a server has ended, if it is one of this session, and what was lost, as bullets of a message.
+end_bullets <- function(base) {
+  server <- the_session$servers[[base]]
+  lost <- environments_on(base)
+  c(
+    x = if (!is.null(server)) server$why_ended(),
+    i = if (!is.null(lost)) paste0("Lost with it: ", lost, ".")
+  )
 }
 
 # Closing --------------------------------------------------------------------------

@@ -160,6 +160,26 @@ log_tail <- function(log, n = 20L) {
   utils::tail(readLines(log, warn = FALSE), n)
 }
 
+# Why a server has ended, in words; `NULL` if it was stopped. It says so itself in its log, and if it
+# could not, Python does.
+end_reason <- function(process, log) {
+  lines <- log_tail(log, 10000L)
+  said <- grep(" CRITICAL ", lines, fixed = TRUE, value = TRUE)
+  python <- grep("^(Timeout [(]|Fatal Python error)", lines, value = TRUE)
+  status <- process$get_exit_status() %||% 0L
+  if (length(said)) {
+    sentence(sub("^.*? CRITICAL [^ ]+: ", "", utils::tail(said, 1L), perl = TRUE))
+  } else if (length(python) && startsWith(python[[1L]], "Timeout")) {
+    "C code held Python's lock for longer than the server's `max_call_seconds`."
+  } else if (length(python)) {
+    python[[1L]]
+  } else if (status == -9L) {
+    "It was killed, as systems do when memory runs out."
+  } else if (status != 0L) {
+    paste(c(paste0("Its exit status is ", status, "."), utils::tail(lines, 3L)), collapse = "\n")
+  }
+}
+
 abort_server_start <- function(message, log_lines, call, hint = NULL) {
   gym_abort(
     c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n"), i = hint),

@@ -138,6 +138,7 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
 
 register_server <- function(server) {
   server$extra_hint <- function(extra) installed_extra_hint(extra, server$python)
+  server$why_ended <- function() end_reason(server$process, server$log)
   the_session$servers[[server$url]] <- server
   # At the session's end R runs the youngest finalizer first. This one is registered after the
   # process was started, so it runs before processx's: the process can still be asked to end. The

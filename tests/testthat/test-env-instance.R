@@ -38,6 +38,45 @@ test_that("an environment that cannot be described is closed again", {
   expect_false(instance_place(server, "0a1b2c3d") %in% ls(the_session$instances))
 })
 
+test_that("a call that hangs ends the server; errors say why, and which environments were lost", {
+  skip_unless_all()
+  # The other calls take less, even on a busy machine.
+  server <- local_odd_server(max_call_seconds = 4)
+  env <- gym_make("CartPole-v1", client = server)
+  many <- gym_make("Acrobot-v1", num_envs = 2, client = server)
+  hangs <- expect_error(
+    gym_make("odd_environments:SlowToMake-v0", seconds = 60, client = server),
+    "Making odd_environments:SlowToMake-v0 took more than 4 seconds",
+    class = "gym_error_connection"
+  )
+  for (cnd in list(hangs, expect_error(env$reset()), expect_error(env_list(server)))) {
+    expect_s3_class(cnd, "gym_error_connection")
+    expect_false(inherits(cnd, "gym_error_argument"))
+    text <- conditionMessage(cnd)
+    expect_match(text, "its option --max-call-seconds sets the limit", fixed = TRUE)
+    for (one in list(env, many)) {
+      expect_match(text, paste0(one$spec$id, " (", one$instance_id, ")"), fixed = TRUE)
+    }
+  }
+})
+
+test_that("an error names what may be lost on a server of somebody else", {
+  skip_unless_all()
+  server <- local_server()
+  base <- server$remote_base
+  env <- gym_make("CartPole-v1", client = server)
+  own <- the_session$servers[[base]]
+  # As if another session had started it.
+  the_session$servers[[base]] <- NULL
+  stop_server(own)
+  remember_instance(instance_place(server, env$instance_id), server, env$instance_id,
+                    env_id = "CartPole-v1")
+  cnd <- expect_error(env_list(server), class = "gym_error_connection")
+  text <- paste0("If it has ended, these are lost: `CartPole-v1 (", env$instance_id, ")`.")
+  expect_match(conditionMessage(cnd), text, fixed = TRUE)
+  the_session$servers[[base]] <- own
+})
+
 test_that("an environment whose server has ended is not open, and says so", {
   server <- local_server()
   single <- gym_make("CartPole-v1", client = server)
@@ -50,7 +89,8 @@ test_that("an environment whose server has ended is not open, and says so", {
   for (env in list(single, several, wrapped)) env$reset()
   gym_server_stop(server)
   # Before anything else has noticed it.
-  expect_error(single$step(1), "on a server that has ended", class = "gym_error_connection")
+  cnd <- expect_error(single$step(1), "on a server that has ended", class = "gym_error_connection")
+  expect_false(inherits(cnd, "gym_error_argument"))
   for (env in list(single, several, wrapped)) {
     expect_false(env$is_open)
     expect_error(env$reset(), "on a server that has ended", class = "gym_error_connection")

@@ -632,3 +632,19 @@ test_that("a long training without a progress bar says that it has begun and wha
   withr::local_options(gym.print_seconds = FALSE)
   expect_length(told(progress = FALSE), 0)
 })
+
+test_that("a server that dies in a training leaves the finished part", {
+  skip_unless_all()
+  skip_on_os("windows")
+  server <- local_server()
+  process <- the_session$servers[[server$remote_base]]$process
+  kill <- function(training) if (nrow(training$history) == 2) process$kill()
+  cnd <- expect_error(
+    train_agent(agent_cem(), "CartPole-v1", iterations = 5, episodes = 1, target = Inf, seed = 1,
+                callback = kill, client = server),
+    class = "gym_error_training"
+  )
+  expect_s3_class(cnd, "gym_error_connection")
+  expect_identical(cnd$result$history$iteration, 1:2)
+  expect_match(conditionMessage(cnd$parent), "It was killed", fixed = TRUE)
+})
