@@ -160,8 +160,8 @@ log_tail <- function(log, n = 20L) {
   utils::tail(readLines(log, warn = FALSE), n)
 }
 
-# Why a server has ended, in words; `NULL` if it was stopped. It says so itself in its log, and if it
-# could not, Python does.
+# Why a server has ended, in words; `NULL` if it was stopped. Its log has a line about that by the
+# server itself, or by Python if the server could not write it.
 end_reason <- function(process, log) {
   lines <- log_tail(log, 10000L)
   said <- grep(" CRITICAL ", lines, fixed = TRUE, value = TRUE)

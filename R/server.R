@@ -34,16 +34,16 @@ is_running <- function(base) {
 #'   `max_processes` (of environments, 128), `max_rollout_processes` (that play whole episodes, one
 #'   per core) and `max_memory_mb` (of all environments, estimated before they are made, 4,096).
 #'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
-#'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an unused environment is removed
-#'   (1,440; 0 for never).
+#'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an
+#'   unused environment is removed (1,440; 0 for never).
 #'   * `vignette("server", package = "gym")` describes the options of a server for a group:
 #'   `allow_host`, `no_auth`.
 #' @param timeout The time for the start, in seconds. The default is 60.
 #' @param token Should the server require its own token? `TRUE` or `FALSE`. Only this session knows
-#'   it, so other accounts of the machine cannot use the server. The returned client carries the token, and so does each client that
-#'   [create_GymClient()] makes for this address in this session. Other processes, such as another R
-#'   session or clients in other languages, need `FALSE` or a token that they know. The default is
-#'   `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
+#'   it, so other accounts of the machine cannot use the server. The returned client carries the
+#'   token, and so does each client that [create_GymClient()] makes for this address in this session.
+#'   Other processes, such as another R session or clients in other languages, need `FALSE` or a
+#'   token that they know. The default is `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
 #'   the machine can then use the server, as a message of class `gym_message_open_server` says.
 #'   `token_file`, `no_auth = TRUE` and the environment variable `GYM_SERVER_TOKEN` take precedence.
 #' @param users Path of a file with a name and a token on each line, a string, or `NULL`. With it

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import faulthandler
 import logging
 import os
 import signal
@@ -118,6 +119,8 @@ def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> 
     if options.stop_on_stdin_eof:
         threading.Thread(target=_wait_for_eof, args=(stop,), daemon=True).start()
     end_when_stuck(options.max_call_seconds)
+    # Log where C code crashed.
+    faulthandler.enable()
     memory.prepare()
     print(f"Server starting at: http://{_in_url(options.host)}:{port}", flush=True)
     # Redirect standard output to standard error: output of environments must not fill a pipe that

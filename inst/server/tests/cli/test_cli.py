@@ -182,12 +182,12 @@ def test_an_option_that_is_gone_names_what_replaces_it(option, instead, capsys):
 HANGS = ("--max-call-seconds", "4")
 
 
-def ended(server, url):
-    """Take a step that hangs; return the server's log."""
+def ended(server, url, status=1):
+    """Take a step that ends the server; return its log."""
     server.post(f"{url}/reset/")
     with pytest.raises((OSError, http.client.HTTPException)):
         server.post(f"{url}/step/", {"action": 0})
-    assert server.process.wait(30) == 1
+    assert server.process.wait(30) == status
     return server.process.stderr.read()
 
 
@@ -204,6 +204,13 @@ def test_a_call_that_hangs_ends_the_server_which_says_why(serve, eventually):
     assert "hanging.py" in log
     assert workers and children
     eventually(lambda: not any(map(is_running, children)))
+
+
+@needs_signals
+def test_a_crash_of_c_code_is_in_the_log(serve):
+    server = serve()
+    url = server.create("faulty_envs:Rogue-v0", kwargs={"does": "crashes"})
+    assert "Fatal Python error: Segmentation fault" in ended(server, url, -signal.SIGSEGV)
 
 
 @needs_signals
