@@ -37,7 +37,8 @@ class Admission(NamedTuple):
         respond: answers the request, given its body and a function that returns whether the client
             still waits; never raises.
         is_known: whether the client may stay connected; others have little time.
-        lasts: whether it also holds for later requests with the same head on the connection.
+        lasts: whether it also holds for later requests with the same head on the connection; others
+            have small bodies only.
     """
 
     respond: Callable[[bytes, Callable[[], bool]], Response]

@@ -9,8 +9,8 @@ from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.instances.about import about
 from gym_server.protocol.answers import tensor_response
+from gym_server.protocol.bodies import parse_tensors
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
-from gym_server.protocol.known_headers import loads_tensors
 from gym_server.rendering.png import png
 from gym_server.response import Response
 
@@ -87,7 +87,7 @@ def env_reset(call: Call) -> dict:
     env_fields.FINAL_OBS,
     once=True,
     tensors=True,
-    tensor_body=loads_tensors,
+    tensor_body=parse_tensors,
 )
 def env_step(call: Call) -> dict:
     """Take one step."""

@@ -27,6 +27,9 @@ _UNKNOWN_SECONDS = 20.0
 # How long a known client may be silent, or take to read a response, in seconds.
 _IDLE_SECONDS = 3600.0
 
+# The largest body of a client whose admission does not last.
+_UNTRUSTED_BODY_BYTES = 2**16
+
 # How much a client may still send after a refusal, so that it sees the response, and how long it
 # may pause.
 _DISCARD_BYTES = 2**30
@@ -120,10 +123,13 @@ class Connection:
         """Answer one request; return whether another may follow."""
         raw = self._read_head()
         known = self._heads.get(raw) or self._admit(raw)
-        head, (respond, _, _) = known
+        head, (respond, _, lasts) = known
         if head.expects and self._at == len(self._data):
             self._socket.sendall(b"HTTP/1.1 100 Continue\r\n\r\n")
-        body = self._read(head.body_bytes) if head.body_bytes is not None else self._read_chunks()
+        if head.body_bytes is not None:
+            body = self._read(head.body_bytes)
+        else:
+            body = self._read_chunks(lasts)
         self._phase = _Phase.ANSWERING
         response = respond(body, self._is_connected)
         del body
@@ -143,7 +149,7 @@ class Connection:
         admission = self._app.admit({**self._base_environ, **head.environ})
         if isinstance(admission, Response):
             raise _RefusedError(admission, with_body=head.method != "HEAD")
-        self._check_size(head.body_bytes or 0)
+        self._check_size(head.body_bytes or 0, admission.lasts)
         if admission.is_known and not self.is_known:
             self.is_known = True
             self._socket.settimeout(_IDLE_SECONDS)
@@ -157,8 +163,8 @@ class Connection:
     def _refusal(self, status: int, reason: str = "") -> _RefusedError:
         return _RefusedError(self._app.refuse(status, reason))
 
-    def _check_size(self, size: int) -> None:
-        if size > self._max_body_bytes:
+    def _check_size(self, size: int, is_trusted: bool) -> None:
+        if size > (self._max_body_bytes if is_trusted else _UNTRUSTED_BODY_BYTES):
             raise self._refusal(413)
 
     # Receiving ------------------------------------------------------------------------------
@@ -218,11 +224,11 @@ class Connection:
             left -= len(parts[-1])
         return b"".join(parts)
 
-    def _read_chunks(self) -> bytes:
+    def _read_chunks(self, is_trusted: bool) -> bytes:
         """Return a body that comes in chunks."""
         body = bytearray()
         while size := self._read_chunk_size():
-            self._check_size(len(body) + size)
+            self._check_size(len(body) + size, is_trusted)
             body += self._read(size)
             if self._read(2) != b"\r\n":
                 raise self._refusal(400, "a chunk is longer than it says")

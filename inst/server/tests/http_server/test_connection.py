@@ -173,6 +173,14 @@ def test_an_unknown_client_may_not_be_silent(converse, begun):
     assert client.recv(1) == b""
 
 
+@pytest.mark.parametrize("app", [App(lasts=False), App(knows=False, lasts=False)])
+@pytest.mark.parametrize("sent", [POST % 2**17, CHUNKED + b"20000\r\n"], ids=["whole", "chunked"])
+def test_a_client_without_the_token_cannot_make_it_keep_a_large_body(converse, app, sent):
+    client, _ = converse(app)
+    client.sendall(sent)
+    assert read_head(client).startswith(b"HTTP/1.1 413 ")
+
+
 @pytest.mark.parametrize(
     ("begun", "drop"),
     [
