@@ -14,6 +14,7 @@ from gym_server.http_server.server import Server, bind
 pytestmark = pytest.mark.slow
 
 GET = b"GET /v1/health/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+POST = b"POST /v1/envs/ HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n{"
 MOST = 10
 
 
@@ -21,6 +22,7 @@ MOST = 10
 def crowded(monkeypatch):
     """Run a server that allows few connections; return a function that opens one."""
     monkeypatch.setattr(server_module, "_MOST_CONNECTIONS", MOST)
+    monkeypatch.setattr(server_module, "_ENDED_AT_ONCE", 1)
     # On a busy machine, a dropped connection takes longer to end, and more would be dropped.
     monkeypatch.setattr(server_module, "_MOMENT_SECONDS", 5)
     app = create_app()
@@ -65,6 +67,16 @@ def test_the_oldest_of_unknown_clients_leaves_for_a_new_one(crowded, begun):
     for connection in unknown[2:]:
         connection.sendall(GET[len(begun) :])
         assert is_well(connection, sent=True)
+
+
+def test_half_of_a_request_leaves_before_a_silent_client_that_is_known(crowded):
+    silent = crowded()
+    half = [crowded() for _ in range(MOST - 1)]
+    assert all(is_well(connection) for connection in (silent, *half))
+    for connection in half:
+        connection.sendall(POST)
+    assert all(is_well(crowded()) for _ in range(3))
+    assert is_well(silent)
 
 
 def test_if_all_are_known_the_one_leaves_that_was_silent_for_longest(crowded):

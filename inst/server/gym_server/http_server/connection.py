@@ -305,9 +305,11 @@ class Connection:
             self.end()
 
     @property
-    def is_waiting(self) -> bool:
-        """Whether it waits for a request or the rest of one."""
-        return self._phase in (_Phase.IDLE, _Phase.RECEIVING)
+    def rank(self) -> tuple[bool, bool, float] | None:
+        """What to sort by to make room, first those that leave; None if it is at work."""
+        if self._phase not in (_Phase.IDLE, _Phase.RECEIVING):
+            return None
+        return self.is_known, self._phase is _Phase.IDLE, self.heard
 
     def end(self) -> None:
         """Receive no more; a request that has arrived is still answered."""

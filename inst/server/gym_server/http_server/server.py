@@ -20,6 +20,9 @@ log = logging.getLogger(__name__)
 # Each has a thread, which takes some memory.
 _MOST_CONNECTIONS = 512
 
+# How many connections end to make room.
+_ENDED_AT_ONCE = 8
+
 # The interval between two warnings, in seconds.
 _WARN_SECONDS = 10.0
 
@@ -155,18 +158,15 @@ class Server:
             self._make_room("No more connections: this process may start no more threads")
 
     def _make_room(self, why: str) -> None:
-        """End the connection that was silent for longest; those of unknown clients come first.
-
-        Waits briefly until any has ended.
-        """
+        """End the connections of the first ranks, and wait briefly until any has ended."""
         # A client can trigger this a thousand times a second.
         if time.monotonic() > self._warned + _WARN_SECONDS:
             self._warned = time.monotonic()
             log.warning("%s", why)
         with self._changed:
-            waiting = [one for one in self._connections if one.is_waiting]
-            if waiting:
-                min(waiting, key=lambda one: (one.is_known, one.heard)).end()
+            ranks = {one: rank for one in self._connections if (rank := one.rank) is not None}
+            for one in sorted(ranks, key=ranks.__getitem__)[:_ENDED_AT_ONCE]:
+                one.end()
             self._changed.wait(_MOMENT_SECONDS)
 
     def _serve(self, connection: Connection) -> None:
