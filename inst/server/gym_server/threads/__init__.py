@@ -1,1 +1,1 @@
-"""What one thread can do about another that is stuck."""
+"""What the threads are doing in environments, and the lock of each."""
