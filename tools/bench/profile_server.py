@@ -7,11 +7,10 @@ requests, in microseconds: code that has slept is slower than in a busy loop.
     recorded               the last request and response, base64
     round_trip PAUSE URL   the recorded step over a plain socket, each with its own key
     echo PAUSE             the same number of bytes to another process and back
-    application PAUSE      the recorded step passed to the WSGI application, and parts of that
+    application PAUSE      the recorded step passed to the application, and parts of that
 """
 
 import base64
-import io
 import json
 import random
 import re
@@ -29,6 +28,7 @@ from wsgiref.util import setup_testing_defaults
 import gymnasium
 from gym_server.api.app import create_app
 from gym_server.protocol import answers, bodies
+from gym_server.response import Response
 
 _STEPS = 8  # With alternating actions no episode of CartPole ends earlier.
 _EPISODES = 100
@@ -156,14 +156,19 @@ _env = gymnasium.make("CartPole-v1")
 
 @cache
 def _instance() -> str:
-    environ = _environ("/v1/envs/", {}, b'{"env_id": "CartPole-v1"}')
-    return json.loads(b"".join(_app(environ, lambda *_: None)))["instance_id"]
+    body = b'{"env_id": "CartPole-v1"}'
+    made = _app.admit(_environ("/v1/envs/", {})).respond(body, lambda: True)
+    return json.loads(made.body)["instance_id"]
 
 
 def _post(what: str, request: bytes = b"\r\n\r\n") -> bytes:
-    body = request.split(b"\r\n\r\n", 1)[1]
-    environ = _environ(f"/v1/envs/{_instance()}/{what}", _headers(), body)
-    return b"".join(_app(environ, lambda *_: None))
+    return _route(what)(request.split(b"\r\n\r\n", 1)[1], lambda: True).body
+
+
+@cache
+def _route(what: str) -> Callable[[bytes, Callable[[], bool]], Response]:
+    """Return what answers a body, as the server keeps it for each head."""
+    return _app.admit(_environ(f"/v1/envs/{_instance()}/{what}", _headers())).respond
 
 
 @cache
@@ -172,14 +177,12 @@ def _headers() -> dict[str, str]:
     return dict(line.lower().split(": ", 1) for line in head.split("\r\n")[1:])
 
 
-def _environ(path: str, headers: dict[str, str], body: bytes) -> dict:
+def _environ(path: str, headers: dict[str, str]) -> dict:
     environ = {
         "REQUEST_METHOD": "POST",
         "PATH_INFO": path,
         "CONTENT_TYPE": headers.get("content-type", ""),
-        "CONTENT_LENGTH": str(len(body)),
         "HTTP_ACCEPT": headers.get("accept", ""),
-        "wsgi.input": io.BytesIO(body),
     }
     setup_testing_defaults(environ)
     return environ

@@ -35,13 +35,14 @@ class RequestHead:
         """
         if raw.count(b"\r\n") > _MOST_LINES + 2:
             raise HttpParserError(f"its head has more than {_MOST_LINES} lines")
+        # Old versions of httptools would take that for the end of a line, and twice for the head's.
         if raw.count(b"\n") != raw.count(b"\r\n"):
             raise HttpParserError("a line ends without a carriage return")
         self.method = ""
         self._url = b""
         self._headers: list[tuple[bytes, bytes]] = []
         self._parser: HttpRequestParser | None = HttpRequestParser(self)
-        # With the wish for another protocol the request is a complete one, too.
+        # A request that asks for another protocol is a complete one, too.
         with contextlib.suppress(HttpParserUpgrade):
             self._parser.feed_data(raw)
         # It refers to this object.
