@@ -145,7 +145,7 @@ def application(pause: str) -> dict[str, float]:
             lambda action: _post("step/", requests(action)), sleep, lambda: _post("reset/")
         ),
         "loads": timed(lambda _: bodies.loads(body), sleep),
-        "answer": timed(lambda _: answers.answer(answer, None), sleep),
+        "answer": timed(lambda _: answers.response_to(answer, None), sleep),
         "env": timed(_env.step, sleep, _env.reset),
     }
 
