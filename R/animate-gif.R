@@ -16,13 +16,11 @@ write_gif <- function(pngs, file, delays, width = NULL) {
     if (!is.null(width)) image <- magick::image_scale(image, as.character(width))
     pixels <- magick::image_data(image, "rgb")
     # A part keeps its place and its delay, and stays until the next one covers it.
-    image <- in_plain_letters(
-      magick::image_animate(image, delay = delays[[i]], dispose = "none")
-    )
+    image <- magick::image_animate(image, delay = delays[[i]], dispose = "none")
     parts[[i]] <- crop_image(image, changed_part(before, pixels))
     before <- pixels
   }
-  gif <- in_plain_letters(magick::image_write(magick::image_join(parts), format = "gif"))
+  gif <- magick::image_write(magick::image_join(parts), format = "gif")
   writeBin(gif, file)
   dim(pixels)[2:3]
 }
@@ -51,12 +49,4 @@ crop_image <- function(image, part) {
   magick::image_quantize(
     magick::image_crop(image, area, repage = FALSE), max = 256, colorspace = "sRGB", dither = FALSE
   )
-}
-
-# ImageMagick changes the case of the format "gif"; in a Turkish locale that gives other letters.
-in_plain_letters <- function(code) {
-  locale <- Sys.getlocale("LC_CTYPE")
-  on.exit(Sys.setlocale("LC_CTYPE", locale))
-  Sys.setlocale("LC_CTYPE", "C")
-  code
 }

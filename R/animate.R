@@ -139,7 +139,7 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
   check_count(width, max = 65535, allow_null = TRUE, call = call)
   check_count(every, allow_null = TRUE, call = call)
   if (!is.null(file)) {
-    if (!rlang::is_string(file) || !grepl("[.](gif|mp4)$", lower_case(file))) {
+    if (!rlang::is_string(file) || !grepl("[.](gif|mp4)$", tolower(file))) {
       abort_argument(file, "the name of a file that ends in .gif or .mp4, or NULL", "file", call)
     }
     if (!dir.exists(dirname(file))) {
@@ -150,7 +150,7 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
   if (!is.null(file)) absolute_path(file)
 }
 
-is_mp4 <- function(file) !is.null(file) && endsWith(lower_case(file), ".mp4")
+is_mp4 <- function(file) !is.null(file) && endsWith(tolower(file), ".mp4")
 
 #' Get the frames of an episode of a rollout
 #' @noRd

@@ -122,7 +122,7 @@ name_of_number <- function(space, path) {
   if (length(name) && !is.na(name)) paste0(" (", name, ")")
 }
 
-lower_first <- function(text) paste0(lower_case(substr(text, 1L, 1L)), substring(text, 2L))
+lower_first <- function(text) paste0(tolower(substr(text, 1L, 1L)), substring(text, 2L))
 
 look_at_step <- function(check, out, place) {
   note <- function(key, ...) note_finding(check, "step", paste0(...), key = key)

@@ -305,19 +305,9 @@ end_text <- function(env) {
   if (is.null(ended)) "closed" else paste("made", ended)
 }
 
+# print() shows all that there is to sum up.
 #' @export
-summary.gym_env <- function(object, ...) structure(list(env = object), class = "summary.gym_env")
-
-#' @export
-print.summary.gym_env <- function(x, ...) {
-  print(x$env)
-  spec <- x$env$spec
-  threshold <- spec$reward_threshold
-  cat("  step limit:   ", spec$max_episode_steps %||% "none", "\n", sep = "")
-  cat("  solved at:    ", if (is.null(threshold)) "no threshold" else number_text(threshold), "\n",
-      sep = "")
-  invisible(x)
-}
+summary.gym_env <- function(object, ...) object
 
 # A name that an environment does not have is an error. (R's own `$` returns NULL, and calling that
 # fails with "attempt to apply non-function".) `[[` returns NULL. Every step calls this method, so

@@ -281,7 +281,7 @@ abort_made_once <- function(id, call) {
 registered_rows <- function(search = NULL) {
   ids <- as.character(names(the_session$environments))
   if (!is.null(search)) {
-    ids <- ids[grepl(lower_case(search), lower_case(ids), fixed = TRUE)]
+    ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
   }
   specs <- lapply(ids, registered_spec)
   is_vectorized <- function(registered) isTRUE(definition_of(registered$entry_point)$vectorized)

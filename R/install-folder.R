@@ -33,9 +33,9 @@ check_extras <- function(extras, call = rlang::caller_env()) {
 # The name of this system in lock files.
 system_name <- function() {
   info <- Sys.info()
-  machine <- lower_case(info[["machine"]])
+  machine <- tolower(info[["machine"]])
   machine <- switch(machine, amd64 = , "x86-64" = "x86_64", machine)
-  paste0(lower_case(info[["sysname"]]), "-", machine)
+  paste0(tolower(info[["sysname"]]), "-", machine)
 }
 
 # The lock files are written by tools/lock: base.txt has the server's own packages, EXTRA.txt those

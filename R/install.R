@@ -183,7 +183,7 @@ environment_problem <- function(python) {
 #' @return The path of the environment's Python, or `NULL` without consent.
 #' @noRd
 prompt_for_python <- function() {
-  if (lower_case(Sys.getenv("GYM_INSTALL")) %in% c("1", "true", "yes")) {
+  if (tolower(Sys.getenv("GYM_INSTALL")) %in% c("1", "true", "yes")) {
     return(keep_random_state(gym_server_install(ask = FALSE)))
   }
   if (!rlang::is_interactive() || isTRUE(the_session$install_declined)) {

@@ -13,7 +13,7 @@ new_space <- function(description) {
 
 space_class <- function(kind) {
   array <- if (kind %in% c("Box", "MultiDiscrete", "MultiBinary")) "gym_space_array"
-  c(paste0("gym_space_", lower_case(kind)), array, "gym_space")
+  c(paste0("gym_space_", tolower(kind)), array, "gym_space")
 }
 
 init_space <- function(space) UseMethod("init_space")

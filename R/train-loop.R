@@ -301,7 +301,7 @@ inform_of_pace <- function(finished, total, unit, elapsed) {
   if (tells) {
     rlang::inform(
       c(i = paste0("Trained for ", whole_number_text(finished), " of ",
-                   count_of(total, lower_case(unit)), " in ", seconds_text(elapsed),
+                   count_of(total, tolower(unit)), " in ", seconds_text(elapsed),
                    "; at this rate the rest takes ", seconds_text(left), "."),
         i = "`progress = TRUE` shows a bar."),
       class = "gym_message_pace"

@@ -173,34 +173,6 @@ returned_unit <- function(agent) {
   if (by_steps) "episodes" else "candidates"
 }
 
+# print() shows all that there is to sum up.
 #' @export
-summary.gym_training <- function(object, ...) {
-  structure(list(training = object), class = "summary.gym_training")
-}
-
-#' @export
-print.summary.gym_training <- function(x, ...) {
-  training <- x$training
-  cat(training_lines(training)[1:3], sep = "\n")
-  if (!nrow(training$history)) {
-    return(invisible(x))
-  }
-  stopping <- training$evaluations[training$evaluations$kind == "stopping", ]
-  last <- training$history[nrow(training$history), ]
-  several <- if (nrow(stopping) > 1L) paste0("s, the last of ", nrow(stopping))
-  cat(
-    "",
-    paste0("The ", returned_unit(training$agent), " of the last iteration: mean return ",
-           number_text(last$mean_return), ", from ", number_text(last$min_return), " to ",
-           number_text(last$max_return)),
-    if (length(stopping$iteration)) {
-      paste0("Stopping evaluation", several, ": ",
-             evaluation_text(stopping[nrow(stopping), ]))
-    },
-    if (!is.null(training$final)) {
-      paste0("Final evaluation: ", evaluation_text(training$final), verdict_text(training))
-    },
-    sep = "\n"
-  )
-  invisible(x)
-}
+summary.gym_training <- function(object, ...) object

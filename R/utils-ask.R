@@ -22,7 +22,7 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   if (!nzchar(answer)) {
     return(default)
   }
-  choice <- pmatch(lower_case(answer), c("yes", "no"))
+  choice <- pmatch(tolower(answer), c("yes", "no"))
   if (is.na(choice)) {
     gym_abort(
       c(

@@ -22,9 +22,6 @@ marked_text <- function(x, ...) {
 # One by one: together they would all get as many decimals as the longest needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
 
-# In a Turkish locale tolower("I") has no dot, and toupper("i") has one.
-lower_case <- function(x) chartr("A-Z", "a-z", x)
-
 percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
 
 se_text <- function(se) if (!is.na(se)) paste0(" (standard error ", number_text(se), ")")
@@ -45,7 +42,7 @@ elapsed_text <- function(seconds, before = " in ") {
 prints_times <- function() !isFALSE(getOption("gym.print_seconds"))
 
 # A name without the characters that people confuse.
-plain_name <- function(x) gsub("[._]", "", lower_case(x))
+plain_name <- function(x) gsub("[._]", "", tolower(x))
 
 # The names of arguments in Stable-Baselines3, RLlib and textbooks, in plain form, and ours.
 other_names <- list(
@@ -75,7 +72,7 @@ nearest_name <- function(name, choices) {
   }
   distance <- function(form) utils::adist(form(plain_name(name)), form(plain_name(choices)))[1L, ]
   # `max_steps` is `max_episode_steps` with a word left out.
-  words <- function(x) strsplit(lower_case(x), "[._]")
+  words <- function(x) strsplit(tolower(x), "[._]")
   wanted <- words(name)[[1L]]
   within <- length(wanted) > 1L & vapply(words(choices), function(of) all(wanted %in% of), NA)
   begins <- nchar(name) > 3L & startsWith(plain_name(choices), plain_name(name))

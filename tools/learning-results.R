@@ -49,7 +49,6 @@ if ("ars" %in% wanted) {
   one <- trained$ars$trainings[["1"]]
   results$one <- one
   results$one_lines <- utils::capture.output(print(one))
-  results$one_summary <- utils::capture.output(print(summary(one)))
   results$provenance <- utils::capture.output(print(provenance(trained$ars)))
 }
 saveRDS(results, file, compress = "xz", version = 3)

@@ -67,15 +67,6 @@ test_that("no picture is shorter than browsers allow, at the same pace", {
   expect_identical(animation_plan(1, fps = 50), list(steps = 0L, delays = 100L))
 })
 
-test_that("in a Turkish locale an animation is written, whatever letters its file ends with", {
-  skip_if_not_installed("magick")
-  played <- short_rollout()
-  file <- withr::local_tempfile(fileext = ".GIF")
-  local_locale("LC_CTYPE", "tr_TR", "ISO-8859-9")
-  animate(played, file, width = 60, every = 10)
-  expect_identical(readBin(file, "raw", 6L), charToRaw("GIF89a"))
-})
-
 test_that("more frames than a GIF can show at that pace are left out, with a message", {
   expect_message(
     insisted <- animation_plan(101, fps = 100, every = 1), "`every` is 2 instead of 1",

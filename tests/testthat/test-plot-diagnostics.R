@@ -9,7 +9,6 @@ test_that("diagnostics have a panel for each number that is logged, without the 
   of <- picture$data[picture$data$name == "value_loss", ]
   expect_identical(of$steps, trained$history$steps[-1])
   expect_identical(of$value, trained$history$value_loss[-1])
-  expect_match(capture.output(summary(trained)), "The episodes of the last", all = FALSE)
   withr::local_pdf(NULL)
   expect_s3_class(plot(trained, type = "diagnostics"), "ggplot")
   expect_error(ggplot2::autoplot(a = trained, b = trained, type = "diagnostics"), "one training",

@@ -168,8 +168,9 @@ test_that("results are printed without times if the user leaves them out", {
                          eval_episodes = 2)
   search <- search_random(env, rounds = 2, target = 9, seed = 1)
   results <- list(
-    trained, trained$trainings[[1]], summary(trained), summary(trained$trainings[[1]]),
-    search, summary(search, episodes = 2, seed = 1), provenance(trained), provenance(trained$trainings[[1]])
+    trained, trained$trainings[[1]], summary(trained),
+    search, summary(search, episodes = 2, seed = 1),
+    provenance(trained), provenance(trained$trainings[[1]])
   )
   times <- "[0-9] (s|min)\\b|[0-9]:[0-9]|elapsed"
   for (result in results) {

@@ -516,15 +516,12 @@ test_that("arguments that are wrong are refused before anything is made", {
                            client = test_client()), "is_round", class = "gym_error_http")
 })
 
-test_that("a training predicts, and sums up its evaluations", {
+test_that("a training predicts, and its summary prints the final evaluation", {
   at_last <- function(seed, step, action) if (seed <= 2^30 + 2^29) 10 else 1
   trained <- quiet_training(agent_hill_climb(), iterations = 4, target = 20,
                             env = fake_environment(reward = at_last))
   expect_identical(predict(trained, rbind(1:4)), act(trained$policy, rbind(1:4)))
-  lines <- capture.output(print(summary(trained)))
-  expect_match(lines, "candidates .*: mean return 30, from 30 to 30", all = FALSE)
-  expect_match(lines, "^Stopping evaluation: 30 ", all = FALSE)
-  expect_match(lines, "^Final evaluation: 3 ", all = FALSE)
+  expect_output(print(summary(trained)), "\nMean return in [0-9]+ fresh episodes: 3 ")
 })
 
 test_that("the progress bar shows iterations, or steps where these are the budget", {

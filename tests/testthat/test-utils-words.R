@@ -34,15 +34,6 @@ test_that("ids and names of arguments keep their case at the start of a sentence
   }
 })
 
-test_that("in a Turkish locale words of English keep their dots", {
-  local_locale("LC_CTYPE", "tr_TR", "ISO-8859-9")
-  expect_false(identical(tolower("I"), "i"))
-  expect_identical(lower_case("INVERTED Pendulum"), "inverted pendulum")
-  expect_identical(sentence("instance lost"), "Instance lost.")
-  expect_identical(lower_first("It is"), "it is")
-  expect_identical(nearest_name("INSIDE", "inside"), "inside")
-})
-
 test_that("other libraries' names of arguments lead to ours", {
   ppo <- names(formals(learn_ppo))
   expect_identical(nearest_name("lr", ppo), "learning_rate")
