@@ -54,8 +54,8 @@
 #'   (code `missing_dependency`; the hint says how to install it).
 #' * `gym_error_http_429` for more sub-environments than the server allows (code
 #'   `too_many_sub_envs`), if it has no room for more environments or processes (codes
-#'   `too_many_instances`, `too_many_processes`), or if the environment would need more memory than
-#'   is left (code `too_much_memory`).
+#'   `too_many_instances`, `too_many_processes`), or if the system gives the
+#'   server no more memory (code `too_much_memory`; see `max_memory_mb` of [gym_server_start()]).
 #' * `gym_error_http_504` if making it in worker processes takes longer than the server allows (code
 #'   `call_too_long`).
 #' * `gym_error_argument`; `gym_error_connection`.
@@ -63,10 +63,8 @@
 #' The server removes an environment if a call hangs in its worker processes, or if nobody has used
 #' or watched it for a day; see `max_call_seconds` and `idle_minutes` of [gym_server_start()]. Every
 #' later call then raises `gym_error_http_504` with code `call_too_long` or `gym_error_http_410` with
-#' code `instance_idle_closed`. A call that hangs elsewhere ends the server. The code is `instance_memory_closed` if all environments together used
-#' too much memory (`max_memory_mb`) and this one had grown most. If a process of an environment or
-#' of its sub-environments has ended, later calls raise `gym_error_http_500` with code
-#' `environment_died`.
+#' code `instance_idle_closed`. A call that hangs elsewhere ends the server. If a process of its
+#' sub-environments has ended, later calls raise `gym_error_http_500` with code `environment_died`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()

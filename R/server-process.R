@@ -171,10 +171,15 @@ end_reason <- function(process, log) {
     sentence(sub("^.*? CRITICAL [^ ]+: ", "", utils::tail(said, 1L), perl = TRUE))
   } else if (length(python) && startsWith(python[[1L]], "Timeout")) {
     "C code held Python's lock for longer than the server's `max_call_seconds`."
+  } else if (any(grepl("^[^ ]* ?terminat.*bad_alloc", lines))) {
+    # C++ says so, and ends the process.
+    paste("The system gave it no more memory: make fewer or smaller environments, or raise",
+          "`gym_server_start(max_memory_mb = )`.")
   } else if (length(python)) {
     python[[1L]]
   } else if (status == -9L) {
-    "It was killed, as systems do when memory runs out."
+    paste("It was killed, as systems do when memory runs out;",
+          "`gym_server_start(max_memory_mb = )` limits it.")
   } else if (status != 0L) {
     paste(c(paste0("Its exit status is ", status, "."), utils::tail(lines, 3L)), collapse = "\n")
   }

@@ -30,9 +30,9 @@ is_running <- function(base) {
 #'   * `allow_module = c("a", "b")` names Python modules whose environments may be made.
 #'   * `token_file = "token"` names a file with a token of 16 characters or more, which replaces the
 #'   server's own one.
-#'   * Limits (with their defaults): `max_total_sub_envs` (of all environments, 400,000),
-#'   `max_processes` (of environments, 128), `max_rollout_processes` (that play whole episodes, one
-#'   per core) and `max_memory_mb` (of all environments, estimated before they are made, 4,096).
+#'   * Limits (with their defaults): `max_processes` (of environments, 128), `max_rollout_processes`
+#'   (that play whole episodes, one per core) and `max_memory_mb` (of the server's process, and of
+#'   each of its processes, on Linux; three quarters of the machine's).
 #'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
 #'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an
 #'   unused environment is removed (1,440; 0 for never).

@@ -95,8 +95,6 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "kill-server": r("kill-server", 5 if quick else 50),
         "kill-r": r("kill-r", 3 if quick else 20),
         "idle": python("idle", 1000),
-        "memory": python("guests", "memory", 2 if quick else 20),
-        "processes": python("guests", "processes", 1 if quick else 5),
         "os-exit": pytest("tests/processes/test_worker_process.py"),
         "drawing": pytest("tests/test_drawing.py", GYM_TEST_DRAWING="all"),
         "environments": pytest(

@@ -3,6 +3,7 @@
 Made on a server that was started with `--allow-module odd_environments`.
 """
 
+import ctypes
 import time
 
 import gymnasium as gym
@@ -46,6 +47,16 @@ class Failing(Odd):
         if action == 1:
             raise RuntimeError("the pole caught fire")
         return super().step(action)
+
+
+class OutOfMemory(Odd):
+    """Ends its process as a C++ library that gets no memory does."""
+
+    def __init__(self):
+        super().__init__(spaces.Discrete(2))
+
+    def step(self, action):
+        ctypes.CDLL("libstdc++.so.6")._Znwm(ctypes.c_size_t(2**62))
 
 
 class FailsLater(Odd):
@@ -238,6 +249,8 @@ for maker in (
 ):
     name = "".join(word.title() for word in maker.__name__.split("_"))
     gym.register(f"{name}-v0", entry_point=maker, disable_env_checker=True)
+
+gym.register("OutOfMemory-v0", entry_point=OutOfMemory, disable_env_checker=True)
 
 for channels in (1, 3, 4):
     gym.register(

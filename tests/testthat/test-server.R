@@ -15,6 +15,14 @@ test_that("a server starts on a free port, has a log and stops", {
   expect_error(env_list_all(server), class = "gym_error_connection")
 })
 
+test_that("a server that ended without memory names the option that gives it more", {
+  skip_unless_all()
+  skip_on_os(c("windows", "mac"))
+  env <- make_odd("OutOfMemory", local_odd_server())
+  env$reset()
+  expect_error(env$step(1), "max_memory_mb = ", fixed = TRUE, class = "gym_error_connection")
+})
+
 test_that("options of the server are written as the command line reads them", {
   expect_identical(
     server_options(list(max_memory_mb = 1e5, log_level = "info", no_auth = TRUE, off = FALSE)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import traceback
 
@@ -20,7 +21,6 @@ _STATUS = {
     "method_not_allowed": 405,
     "request_conflict": 409,
     "instance_idle_closed": 410,
-    "instance_memory_closed": 410,
     "server_restarted": 410,
     "upload_closed": 410,
     "body_too_large": 413,
@@ -44,10 +44,16 @@ _HEADERS = {
 }
 
 # Errors below 500 that may come after some work was done. Errors from 500 on always may.
-_AFTER_SOMETHING_WAS_DONE = frozenset({"missing_dependency", "monitor_directory"})
+_AFTER_SOMETHING_WAS_DONE = frozenset(
+    {"missing_dependency", "monitor_directory", "too_much_memory"}
+)
 
 # For people: describes the routes. The classic R client shows no error message without this field.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
+
+
+# What Python, MuJoCo and SDL say in exceptions of other classes if there is no more memory.
+_NO_MEMORY = ("can't start new thread", "Could not allocate memory", "Out of memory")
 
 
 class GymServerError(Exception):
@@ -107,25 +113,23 @@ def idle_closed(instance_id: str, env_id: str, minutes: float) -> GymServerError
     )
 
 
-def memory_closed(instance_id: str, env_id: str, megabytes: float) -> GymServerError:
-    """Report an instance that the server closed because memory ran out."""
-    return GymServerError(
-        "instance_memory_closed",
-        f"Instance {instance_id} of {env_id} was closed: all environments together used more "
-        f"memory than allowed, and this one had grown most, by {megabytes:,.0f} MiB",
-        "draw fewer sub-environments, or smaller pictures; the server's option --max-memory-mb "
-        "sets the limit",
-    )
+def lacks_memory(error: BaseException) -> bool:
+    """Return whether an exception says that the system gives no more memory or threads."""
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
+    return isinstance(error, MemoryError) or str(error).endswith(_NO_MEMORY)
 
 
-def rollout_memory_closed(megabytes: float) -> GymServerError:
-    """Report that the server killed a process playing episodes because memory ran out."""
+def too_much_memory(error: BaseException, who: str = "The server") -> GymServerError:
+    """Report that the system gave no more memory; see ``lacks_memory()``.
+
+    Frees what the functions that failed hold in their variables, because the answer needs memory.
+    """
+    traceback.clear_frames(error.__traceback__)
     return GymServerError(
         "too_much_memory",
-        f"The process that played these episodes was ended: all environments together used more "
-        f"memory than allowed, and it used {megabytes:,.0f} MiB",
-        "ask for fewer episodes, or keep fewer steps; the server's option --max-memory-mb sets the "
-        "limit",
+        f"{who} needs more memory than it may have ({_last_line(error)})",
+        "make fewer or smaller environments; the server's option --max-memory-mb sets the limit",
     )
 
 
@@ -180,8 +184,13 @@ def reset_needed(call: str) -> GymServerError:
 
 def environment_error(error: BaseException, who: str = "The environment") -> GymServerError:
     """Wrap an exception from an environment's own code."""
-    last_line = traceback.format_exception_only(type(error), error)[-1].strip()
-    return GymServerError("environment_error", f"{who} raised {last_line}")
+    if lacks_memory(error):
+        return too_much_memory(error, who)
+    return GymServerError("environment_error", f"{who} raised {_last_line(error)}")
+
+
+def _last_line(error: BaseException) -> str:
+    return traceback.format_exception_only(type(error), error)[-1].strip()
 
 
 def environment_died(how: str, doing: str) -> GymServerError:
@@ -219,6 +228,9 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
     """
     if isinstance(error, HTTPException):
         error = _from_http(error)
+    elif lacks_memory(error):
+        error = too_much_memory(error)
+        log.warning("%s", error.message)
     elif not isinstance(error, GymServerError):
         log.error("A bug in the server", exc_info=error)
         error = GymServerError(
@@ -226,7 +238,7 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
             f"The server failed: {type(error).__name__}: {error}",
             "this is a bug in gym_server; the server's log has the details",
         )
-    elif error.code == "environment_error" and not error.is_logged:
+    elif error.code in ("environment_error", "too_much_memory") and not error.is_logged:
         log.warning("%s", error.message, exc_info=error)
     body = {
         "message": error.message,

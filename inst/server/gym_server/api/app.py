@@ -30,8 +30,6 @@ from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.processes.pool import pool
-from gym_server.processes.set_up import OWN_MB
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.response import Admission, Response
 
@@ -78,7 +76,6 @@ class GymApp(Flask):
         )
         watch_keys = WatchKeys(prefix=config.watch_prefix)
         self._guard = Guard(config.access, watch_keys)
-        pool.most_mb = config.limits.max_memory_mb + OWN_MB
         self._rollouts = Rollouts(config.limits.rollout_processes)
         self._exactly_once = ExactlyOnce(self._instances.lives)
         self._router = Router(self, BLUEPRINTS)

@@ -100,8 +100,6 @@ class Endpoint:
     def _perform(self, call: Call, request_id: RequestId | None) -> tuple[Response, bool]:
         """Return the response, and whether doing it again could make a difference."""
         try:
-            if self._route.grows:
-                self._services.instances.account.check()
             response = response_to(self._route.handler(call), request_id)
             if self._used_id is None and self._route.once:
                 self._exactly_once.forget_closed()

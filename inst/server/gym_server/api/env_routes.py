@@ -31,7 +31,6 @@ bp = RouteBlueprint("envs")
     Field("autoreset_mode", env_fields.AUTORESET_MODE),
     Field("name", env_fields.NAME),
     once=True,
-    grows=True,
 )
 def env_create(call: Call) -> dict:
     """Create an environment."""
@@ -70,8 +69,6 @@ def env_about(call: Call) -> dict:
 def env_reset(call: Call) -> dict:
     """Start an episode."""
     fields = call.fields
-    if isinstance(fields["seed"], tuple):
-        call.services.instances.account.check()
     return call.instance.reset(
         fields["seed"], fields["options"], call.wanted_form, fields["reset_mask"]
     )
@@ -101,7 +98,6 @@ def env_step(call: Call) -> dict:
     "GET",
     INSTANCE + "render/",
     Field("sub_env", env_fields.QUERY_INTEGER),
-    grows=True,
     content_type="image/png",
     tensors=True,
 )
@@ -113,7 +109,7 @@ def env_render(call: Call) -> Response:
     return Response(200, png(frame), "image/png")
 
 
-@bp.declare("GET", INSTANCE + "model/", grows=True)
+@bp.declare("GET", INSTANCE + "model/")
 def env_model(call: Call) -> dict:
     """Return the transition model of an environment that has one."""
     return call.instance.transition_model()

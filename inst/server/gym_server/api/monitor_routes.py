@@ -17,7 +17,6 @@ bp = RouteBlueprint("monitors")
     Field("force", BOOLEAN),
     Field("resume", BOOLEAN),
     Field("video_callable", env_fields.VIDEO_CALLABLE),
-    grows=True,
 )
 def env_monitor_start(call: Call) -> None:
     """Record the episodes that start from now on."""

@@ -44,7 +44,6 @@ _KEEP = Kind(f"a list of some of {', '.join(_KEPT)}", _keep)
     Field("policy", OBJECT),
     Field("max_steps", env_fields.POSITIVE),
     Field("keep", _KEEP),
-    grows=True,
     tensors=True,
     tensor_body=loads_file,
 )

@@ -42,7 +42,6 @@ class Route:
         callers: who may call it.
         once: whether the body may have an idempotency key, with which the request is done only
             once.
-        grows: whether it may increase the memory of the server or its processes.
         ends_instance: whether it closes the instance in the path.
         content_type: the content type of an ordinary response.
         tensors: whether the response may be tensors, if the client accepts them.
@@ -57,7 +56,6 @@ class Route:
     handler: Handler
     callers: Callers = Callers.TOKEN
     once: bool = False
-    grows: bool = False
     ends_instance: bool = False
     content_type: str = JSON
     tensors: bool = False

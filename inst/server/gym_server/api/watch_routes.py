@@ -97,7 +97,6 @@ def env_watch_script(call: Call) -> Response:
     Field("sub_env", env_fields.QUERY_INTEGER),
     Field("after", env_fields.QUERY_INTEGER),
     callers=Callers.WATCHERS,
-    grows=True,
 )
 def env_watch_state(call: Call) -> Response:
     """Wait for a new frame; frames are drawn only while somebody waits."""

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from gym_server import logs
+from gym_server import logs, memory
 from gym_server.api.access import Access, is_loopback
 from gym_server.api.app import Config, GymApp, create_app
 from gym_server.api.watch_keys import PREFIX_VARIABLE
@@ -25,7 +25,7 @@ from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
 from gym_server.cli.users import BadUsersError, make_front
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
-from gym_server.processes import memory, start
+from gym_server.processes import start
 
 log = logging.getLogger("gym_server")
 
@@ -66,6 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "allow this"
         )
     allow_many_open_files()
+    memory.limit(options.max_memory_mb)
     stop = _Stop()
     try:
         monitor_dir = _prepare_monitor_dir(options.monitor_dir)

@@ -65,11 +65,6 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         limits.add_argument(option, type=kind, default=default, help=text, metavar=metavar)
 
     add(
-        "max_total_sub_envs",
-        _number(1, 100_000_000),
-        "sub-environments of all environments together (four times --max-num-envs)",
-    )
-    add(
         "max_processes",
         _number(1, 100_000),
         "processes that run sub-environments, of all environments (%(default)s)",
@@ -79,11 +74,11 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
         _number(1, 1_000),
         "processes that play whole episodes, besides these (one per core)",
     )
-    add(
-        "max_memory_mb",
-        _number(1, 2**24),
-        "memory of all environments, estimated before they are created and measured afterwards "
-        "(%(default)s)",
+    limits.add_argument(
+        "--max-memory-mb",
+        type=_number(1, 2**24),
+        help="memory that the server's process may take, and each of its processes, besides what "
+        "a new server has; on Linux only (three quarters of the machine's)",
     )
     add(
         "max_call_seconds",
@@ -118,6 +113,7 @@ _ENDED = {
     "--max-monitor-mb": "the server's user looks after the disk; a service can have a quota",
     "--max-num-envs": "an environment may have 100,000 sub-environments; --max-memory-mb limits "
     "the server's memory",
+    "--max-total-sub-envs": "--max-memory-mb limits the server's memory",
     "--max-watchers": "every watch page is one of the server's user",
     "--max-worker-mb": "--max-memory-mb limits the server",
     "--no-shutdown": "the server serves one user, who may stop it; for a class, --users FILE "

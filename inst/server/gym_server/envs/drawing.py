@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
-from gym_server.processes.memory import measured
 from gym_server.rendering.render_thread import RenderThread
 
 
@@ -14,21 +12,17 @@ class Drawing:
 
     Attributes:
         drawn: whether it may have been drawn.
-        grown: by how many bytes drawing it has made this process grow.
     """
 
     def __init__(self, renderer: RenderThread, drawn: bool = False) -> None:
         """Start with an environment that draws in each step (``drawn``), or was not drawn yet."""
         self._renderer = renderer
         self.drawn = drawn
-        self.grown = 0
 
     def draw(self, render: Callable, *args: object) -> object:
         """Call a function that draws, and return the frame."""
         self.drawn = True
-        frame, grown = self._renderer.run(measured, partial(render, *args))
-        self.grown += grown
-        return frame
+        return self._renderer.run(render, *args)
 
     def close(self, close: Callable[[], object]) -> None:
         """Call the function that closes the environment."""

@@ -14,7 +14,7 @@ from gymnasium.envs import registration
 from gymnasium.vector import AutoresetMode
 
 from gym_server import logs
-from gym_server.envs import argument_limits, mujoco
+from gym_server.envs import mujoco
 from gym_server.envs.atari import classic_game
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.extras import (
@@ -24,8 +24,6 @@ from gym_server.envs.extras import (
     unwrapped,
     why_unavailable,
 )
-from gym_server.envs.memory_estimate import environment_bytes
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import LONGEST_ID, import_allowed, importing, look_up, near
 from gym_server.envs.tuple_arguments import parameters_of, with_tuples
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
@@ -34,15 +32,12 @@ from gym_server.json_values import brief, parse_nonfinite
 ResultT = TypeVar("ResultT")
 
 
-def make_env(
-    config: EnvConfig, allowed_modules: Collection[str], memory: MemoryReservation
-) -> gymnasium.Env:
+def make_env(config: EnvConfig, allowed_modules: Collection[str]) -> gymnasium.Env:
     """Make an environment, without its wrappers.
 
     Args:
         config: what the client chose.
         allowed_modules: the modules that an id may import.
-        memory: reserves the environment's memory.
 
     Raises:
         GymServerError: ``malformed_env_id``, ``unknown_env_id``, ``deprecated_env_id``,
@@ -52,8 +47,6 @@ def make_env(
     kwargs = config.kwargs or {}
     check_kwargs(kwargs)
     spec = find_spec(config.env_id, allowed_modules)
-    argument_limits.check_environment(spec, kwargs, config.wrappers)
-    memory.reserve(environment_bytes(spec, kwargs), spec.id)
     with naming_extra(spec):
         chosen = choose_render_mode(load_creator(spec), spec, config.render_mode)
         return make_from_spec(spec, chosen, parse_nonfinite(kwargs))

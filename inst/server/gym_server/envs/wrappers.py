@@ -11,12 +11,9 @@ import gymnasium
 import numpy as np
 from gymnasium import error
 
-from gym_server.envs.argument_limits import check_wrapper
 from gym_server.envs.config import Wrapper
 from gym_server.envs.extras import missing_extra
-from gym_server.envs.memory_estimate import answer_bytes, wrapper_bytes
-from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import GymServerError
+from gym_server.errors import GymServerError, lacks_memory
 from gym_server.json_values import parse_nonfinite
 
 # Wrappers whose arguments are numbers, strings and lists, that keep a single environment, and that
@@ -113,30 +110,20 @@ def check(wrappers: Sequence[Wrapper]) -> None:
             )
 
 
-def wrap(
-    env: gymnasium.Env,
-    wrappers: Sequence[Wrapper],
-    renderer: Any,
-    memory: MemoryReservation | None = None,
-) -> gymnasium.Env:
+def wrap(env: gymnasium.Env, wrappers: Sequence[Wrapper], renderer: Any) -> gymnasium.Env:
     """Put wrappers around an environment, the first one innermost; see ``check()``.
 
     Args:
         env: the environment.
         wrappers: the wrappers.
         renderer: the ``RenderThread`` for wrappers that draw, or a substitute.
-        memory: reserves the wrappers' memory; None if that is already reserved.
 
     Raises:
         GymServerError: ``invalid_kwargs``, ``missing_dependency``, ``too_much_memory``.
     """
     for wrapper in wrappers:
-        if wrapper.name in _DRAWING:
-            env = renderer.run(_wrap, env, wrapper, memory)
-        else:
-            env = _wrap(env, wrapper, memory)
-    if memory is not None:
-        memory.reserve(answer_bytes(env.observation_space), "What is observed")
+        draws = wrapper.name in _DRAWING
+        env = renderer.run(_wrap, env, wrapper) if draws else _wrap(env, wrapper)
     return env
 
 
@@ -177,7 +164,7 @@ def draws_when_stepped(env: gymnasium.Env) -> bool:
     return False
 
 
-def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None) -> gymnasium.Env:
+def _wrap(env: gymnasium.Env, wrapper: Wrapper) -> gymnasium.Env:
     kind = getattr(gymnasium.wrappers, wrapper.name)
     try:
         # bind_partial() first: report an unknown argument before a missing one.
@@ -185,10 +172,6 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None
         inspect.signature(kind).bind(env, **wrapper.kwargs)
     except TypeError as failure:
         raise GymServerError("invalid_kwargs", f"{wrapper.name}: {failure}") from failure
-    check_wrapper(wrapper)
-    if memory is not None:
-        estimate = wrapper_bytes(wrapper.name, parse_nonfinite(wrapper.kwargs), env)
-        memory.reserve(estimate.kept, wrapper.name, later=estimate.answer)
     if wrapper.name in _KEEPING:
         env = _CopiedObservations(env)
     try:
@@ -199,6 +182,8 @@ def _wrap(env: gymnasium.Env, wrapper: Wrapper, memory: MemoryReservation | None
         # The only dependency that these wrappers may lack is OpenCV, which this extra installs.
         raise missing_extra(wrapper.name, "atari") from failure
     except Exception as failure:
+        if lacks_memory(failure):
+            raise
         words = str(failure) or "no reason given"
         raise GymServerError(
             "invalid_kwargs",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gym_server.front.control_groups import ControlGroups
 from gym_server.front.folders import Folders
+from gym_server.memory import machine_mb
 from gym_server.processes.cores import usable_cores
 
 log = logging.getLogger(__name__)
@@ -109,7 +109,7 @@ class Starts:
 
     def _share_mb(self, users: int) -> int:
         """Return the memory of a user, in MiB: an equal part of three quarters of the machine's."""
-        share = self._wishes.memory_mb or _machine_mb() * 3 // 4 // users
+        share = self._wishes.memory_mb or machine_mb() * 3 // 4 // users
         parts = 1 if self._groups is not None else self._processes
         if share // parts < _LEAST_MB:
             raise ShareError(
@@ -142,7 +142,3 @@ class Starts:
                 *("--max-processes", str(self._environment_processes)),
             ]
         return Start((*self._wishes.arguments, *limits), folder, uid, group)
-
-
-def _machine_mb() -> int:
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20

@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 
+from gym_server import memory
 from gym_server.http_server.connection import Connection
 from gym_server.http_server.interface import Application
 
@@ -114,7 +115,9 @@ class Server:
         while not self._stop_asked.is_set():
             # On Windows, signals are handled only after the wait.
             if self._listener in select.select([self._listener, self._wake], [], [], 1.0)[0]:
-                self._accept()
+                # Without memory for a connection, its client finds it closed.
+                with contextlib.suppress(MemoryError):
+                    self._accept()
         self._listener.close()
         self._wake.close()
         self._waker.close()
@@ -151,7 +154,7 @@ class Server:
         # A daemon thread, so that a call that never returns does not keep the process alive.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
-            thread.start()
+            memory.start(thread)
         except RuntimeError:
             client.close()
             self._remove(connection)

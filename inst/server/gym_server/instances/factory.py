@@ -9,8 +9,6 @@ from functools import partial
 from gym_server import logs
 from gym_server.envs import make, wrappers
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.memory_estimate import model_bytes
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.instances.instance import Instance
 from gym_server.instances.single import SingleInstance
 from gym_server.instances.vector import VectorInstance
@@ -24,7 +22,6 @@ def make_instance(
     max_num_envs: int,
     renderer: RenderThread,
     undo: contextlib.ExitStack,
-    reservation: MemoryReservation,
 ) -> Instance:
     """Create an instance whose environment runs in this process.
 
@@ -34,7 +31,6 @@ def make_instance(
         max_num_envs: the largest number of sub-environments.
         renderer: the process's render thread.
         undo: closes the environment if a later step fails.
-        reservation: reserves its memory.
 
     Raises:
         GymServerError: see ``make_env()``, ``make_vector_env()``, ``wrappers.wrap()``
@@ -42,15 +38,12 @@ def make_instance(
     """
     with logs.hearing() as warnings:
         if config.num_envs is None:
-            env = make.make_env(config, allowed_modules, reservation)
+            env = make.make_env(config, allowed_modules)
             undo.callback(_quietly, partial(renderer.close, env.close, drawn=False))
-            reservation.reserve(make.call_env(model_bytes, env), "Its transition model")
-            wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer, reservation)
+            wrapped = make.call_env(wrappers.wrap, env, config.wrappers, renderer)
             instance: Instance = SingleInstance(wrapped, config, renderer)
         else:
-            sub_envs, mode = make_vector_env(
-                config, allowed_modules, max_num_envs, renderer, reservation
-            )
+            sub_envs, mode = make_vector_env(config, allowed_modules, max_num_envs, renderer)
             undo.callback(_quietly, sub_envs.close)
             instance = VectorInstance(sub_envs, mode, config, renderer)
     instance.warnings = warnings

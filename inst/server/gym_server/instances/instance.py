@@ -106,7 +106,6 @@ class Instance(Watchable):
         self.render_fps: object = (env.metadata or {}).get("render_fps")
         self.viewer.fps = usable_fps(self.render_fps)
         self._seed_for_reset: Seed = config.seed
-        self._seed_bytes = 0
         self.was_reset = False
         self._observation: Any = None
         self.max_episode_steps = time_limit(env)
@@ -202,7 +201,6 @@ class Instance(Watchable):
         if form.infos:
             checked_info(info)
         self._seed_for_reset = None
-        self._seed_bytes = _held_by(seed)
         if seed is not None and mask is None:
             self._seed_actions(seed)
         self.was_reset = True
@@ -332,16 +330,6 @@ class Instance(Watchable):
         """Whether an episode ended that only the client can reset."""
         raise NotImplementedError
 
-    @property
-    def grown(self) -> int:
-        """By how many bytes drawing and seeds have made this process grow."""
-        return self.drawing.grown + self._seed_bytes
-
-    @property
-    def pids(self) -> Sequence[int]:
-        """The processes that run it, besides the server's."""
-        return ()
-
     def start_monitor(
         self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
     ) -> None:
@@ -389,9 +377,3 @@ class Instance(Watchable):
 
     def _close_env(self) -> None:
         raise NotImplementedError
-
-
-def _held_by(seed: Seed) -> int:
-    """Return the bytes of seeds for later episodes, which are objects in lists."""
-    lists = [one for one in seed if isinstance(one, tuple)] if isinstance(seed, tuple) else []
-    return 40 * sum(map(len, lists))

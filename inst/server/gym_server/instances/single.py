@@ -8,7 +8,6 @@ import gymnasium
 from gymnasium.spaces import Space
 
 from gym_server import spaces
-from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.make import call_env
@@ -48,7 +47,6 @@ class SingleInstance(Instance):
         _refuse_mask("reset_mask", mask)
         if isinstance(seed, tuple):
             raise invalid_parameter("seed", seed, "an integer, 0 or greater")
-        argument_limits.check_reset_options(self.gym_env, options)
 
     def _reset_env(
         self, seed: Any, options: dict | None, mask: np.ndarray | None, form: AnswerForm

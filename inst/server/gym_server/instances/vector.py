@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from gymnasium.spaces import Dict, Space, Tuple
 from gymnasium.vector import AutoresetMode
 
 from gym_server import spaces
-from gym_server.envs import argument_limits
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info
@@ -66,7 +65,6 @@ class VectorInstance(Instance):
 
     def _check_reset(self, seed: Any, options: dict | None, mask: np.ndarray | None) -> None:
         self._check_seed(seed)
-        argument_limits.check_reset_options(self.gym_env, options)
         if options and "reset_mask" in options:
             raise GymServerError(
                 "invalid_parameter",
@@ -234,11 +232,6 @@ class VectorInstance(Instance):
         return spaces.decode_sub_envs(
             space, value, spaces.Rows(self._num_envs, "the sub-environments")
         )
-
-    @property
-    def pids(self) -> Sequence[int]:
-        """The processes that the sub-environments run in."""
-        return list(self.gym_env.pids)
 
     @property
     def has_ended(self) -> bool:

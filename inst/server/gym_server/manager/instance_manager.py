@@ -7,29 +7,18 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
-from gym_server.budget import Budget
+from gym_server import memory
 from gym_server.envs import allowed_paths, registry, wrappers
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.memory_reservation import MemoryReservation
-from gym_server.errors import (
-    GymServerError,
-    idle_closed,
-    memory_closed,
-    rollout_memory_closed,
-    shutting_down,
-    unknown_instance,
-)
+from gym_server.errors import GymServerError, idle_closed, shutting_down, unknown_instance
 from gym_server.instances.about import list_entry
 from gym_server.instances.factory import make_instance
 from gym_server.instances.instance import Instance
-from gym_server.manager.account import Account
-from gym_server.manager.limits import Limits, Room
-from gym_server.manager.rollouts import Rollouts
-from gym_server.processes import memory
+from gym_server.manager.limits import Limits
 from gym_server.processes.pool import pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.rollouts.task import Task
@@ -39,31 +28,8 @@ from gym_server.vector_envs.num_workers import most_workers
 
 log = logging.getLogger(__name__)
 
-_MB = 2**20
-
 # So many reasons why instances were closed are kept.
 _MOST_REASONS = 1000
-
-
-@dataclass
-class _Taken:
-    """An environment's share of the server's limits, until it is closed."""
-
-    room: Room
-    reservation: MemoryReservation
-
-
-@dataclass(eq=False)
-class _Creation:
-    """An environment that is being created.
-
-    Attributes:
-        config: what its client chose.
-        taken: its share of the server's limits.
-    """
-
-    config: EnvConfig
-    taken: _Taken
 
 
 class InstanceManager:
@@ -93,12 +59,8 @@ class InstanceManager:
         # Whether an environment was closed since the last garbage collection. The watchdog collects
         # garbage and resets this.
         self.left_garbage = False
-        self._budget = Budget(self._limits.max_memory_mb * _MB)
-        self.account = Account(self._budget.limit)
-        # Set while an instance that took too much memory is being closed.
-        self._evicting = threading.Event()
-        # By creation until it ends, then by instance_id until the instance is closed.
-        self._taken: dict[_Creation | str, _Taken] = {}
+        # How many processes each instance takes, from the start of its creation until it is closed.
+        self._workers: dict[str, int] = {}
         # Why the server closed the last instances that it closed itself, by instance_id.
         self._reasons: dict[str, GymServerError] = {}
         self._stopping = False
@@ -116,66 +78,48 @@ class InstanceManager:
         wrappers.check(config.wrappers)
         if config.num_envs is None:
             make_vec.check_single(config)
-        with (
-            self._room_for(config) as creation,
-            calls.call(lambda: f"Making {config}"),
-            contextlib.ExitStack() as undo,
-        ):
-            instance = self._make(creation, undo)
-            self._enlist(instance, creation)
-            undo.pop_all()
+        instance_id, config = self._take_room(config)
+        try:
+            with calls.call(lambda: f"Making {config}"), contextlib.ExitStack() as undo:
+                instance = make_instance(
+                    config, self._allowed_modules, self._limits.max_num_envs, self._renderer, undo
+                )
+                self._enlist(instance, instance_id)
+                undo.pop_all()
+        except BaseException:
+            self._release(instance_id)
+            raise
         instance.report_end(lambda why: self._remove(instance.instance_id, why))
         log.info("Created instance %s of %s", instance.instance_id, instance.env_id)
         return instance
 
-    def _enlist(self, instance: Instance, creation: _Creation) -> None:
+    def _enlist(self, instance: Instance, instance_id: str) -> None:
         """Add an instance to the list."""
         with self._lock:
             if self._stopping:
                 raise shutting_down()
-            instance.instance_id = self._new_id()
-            self._instances[instance.instance_id] = instance
-            self._taken[instance.instance_id] = self._taken.pop(creation)
+            instance.instance_id = instance_id
+            self._instances[instance_id] = instance
+            # It may take fewer processes than it could have.
+            self._workers[instance_id] = instance.num_workers or 0
 
-    @contextlib.contextmanager
-    def _room_for(self, config: EnvConfig) -> Iterator[_Creation]:
-        """Reserve room for an environment while it is created."""
+    def _take_room(self, config: EnvConfig) -> tuple[str, EnvConfig]:
+        """Reserve room for an environment; return its instance_id, and what it may have."""
         workers = most_workers(config)
-        reservation = MemoryReservation(self._budget, config.num_envs or 1)
         with self._lock:
-            taken = sum((one.room for one in list(self._taken.values())), Room(0))
+            left = max(0, self._limits.max_processes - sum(self._workers.values()))
             if not config.wants_workers:
-                workers = min(workers, max(0, self._limits.max_processes - taken.processes))
-            room = Room(config.num_envs or 1, workers)
-            creation = _Creation(replace(config, max_workers=workers), _Taken(room, reservation))
-            self._limits.check_room(len(self._taken), taken, room)
-            self._taken[creation] = creation.taken
-        try:
-            yield creation
-        finally:
-            self._release(creation)
+                workers = min(workers, left)
+            self._limits.check_room(len(self._workers), left, workers)
+            instance_id = self._new_id()
+            self._workers[instance_id] = workers
+        return instance_id, replace(config, max_workers=workers)
 
-    def _release(self, whose: _Creation | str) -> None:
-        """Release the share of an environment that was closed, or not created after all."""
-        taken = self._taken.pop(whose, None)
-        if taken is not None:
-            taken.reservation.give_back()
-            self.left_garbage = True
-
-    def _make(self, creation: _Creation, undo: contextlib.ExitStack) -> Instance:
-        taken = creation.taken
-        instance = make_instance(
-            creation.config,
-            self._allowed_modules,
-            self._limits.max_num_envs,
-            self._renderer,
-            undo,
-            taken.reservation,
-        )
-        # Release the room for processes that were not needed.
+    def _release(self, instance_id: str) -> None:
+        """Release the room of an environment that was closed, or not created after all."""
         with self._lock:
-            taken.room = replace(taken.room, processes=instance.num_workers or 0)
-        return instance
+            if self._workers.pop(instance_id, None) is not None:
+                self.left_garbage = True
 
     def registered(self, search: str | None) -> list[dict]:
         """Return the environments that can be created; see ``registry.search()``."""
@@ -193,7 +137,7 @@ class InstanceManager:
         """
         allowed_paths.check(config, self._may_name_files)
         wrappers.check(config.wrappers)
-        return Task(config, self._allowed_modules, self._budget.limit, **what)
+        return Task(config, self._allowed_modules, **what)
 
     def get(self, instance_id: str) -> Instance:
         """Return an instance.
@@ -247,19 +191,15 @@ class InstanceManager:
         finally:
             self._release(instance.instance_id)
 
-    def _close_in_background(
-        self, instance: Instance, then: Callable[[], None] = lambda: None
-    ) -> threading.Thread:
+    def _close_in_background(self, instance: Instance) -> threading.Thread:
         def close() -> None:
             try:
                 self._close(instance)
             except GymServerError as error:
                 log.warning("Closing instance %s: %s", instance.instance_id, error)
-            finally:
-                then()
 
         closer = threading.Thread(target=close, daemon=True)
-        closer.start()
+        memory.start(closer)
         return closer
 
     def _all(self) -> tuple[Instance, ...]:
@@ -274,40 +214,6 @@ class InstanceManager:
         """Remove an instance whose process has ended; keep the reason."""
         self._unlist(instance_id, why)
         self._release(instance_id)
-
-    def evict_largest(self, rollouts: Rollouts) -> None:
-        """Close the instance that has grown most, if the memory limit is exceeded.
-
-        Unused memory is released first. If a rollout process has grown more, that is killed
-        instead.
-        """
-        self.account.measure()
-        if not self.account.is_exceeded or self._evicting.is_set():
-            return
-        pool.end()
-        memory.give_back()
-        self.account.measure()
-        if not self.account.is_exceeded:
-            return
-        sizes = {one: one.grown + self.account.of(one.pids) for one in self._all()}
-        instance = max(sizes, key=sizes.__getitem__, default=None)
-        playing = {pid: self.account.of([pid]) for pid in rollouts.pids()}
-        largest = max(playing, key=playing.__getitem__, default=None)
-        grown = sizes[instance] if instance is not None else 0
-        if largest is not None and playing[largest] > grown:
-            rollouts.kill(largest, rollout_memory_closed(playing[largest] / _MB))
-            return
-        if instance is None or grown <= 0:
-            return
-        why = memory_closed(instance.instance_id, instance.env_id, grown / _MB)
-        if self._unlist(instance.instance_id, why) is not None:
-            log.warning("%s", why.message)
-            self._evicting.set()
-            self._close_in_background(instance, self._note_evicted)
-
-    def _note_evicted(self) -> None:
-        memory.give_back()
-        self._evicting.clear()
 
     def evict_idle(self, minutes: float) -> None:
         """Close the instances that nobody has used or watched for this long."""
@@ -344,5 +250,5 @@ class InstanceManager:
     def _new_id(self) -> str:
         while True:
             instance_id = secrets.token_hex(4)
-            if instance_id not in self._instances and instance_id not in self._reasons:
+            if instance_id not in self._workers and instance_id not in self._reasons:
                 return instance_id

@@ -9,40 +9,18 @@ from gym_server.processes.cores import usable_cores
 
 
 @dataclass(frozen=True)
-class Room:
-    """The share of one environment in the limits for all environments.
-
-    Attributes:
-        sub_envs: its sub-environments; a single environment counts as one.
-        processes: its own processes.
-    """
-
-    sub_envs: int = 1
-    processes: int = 0
-
-    def __add__(self, other: Room) -> Room:
-        """Return the sum of both."""
-        return Room(self.sub_envs + other.sub_envs, self.processes + other.processes)
-
-
-@dataclass(frozen=True)
 class Limits:
     """The server's limits. The defaults protect a lab's server on one machine.
 
     Attributes:
         max_instances: the number of environments.
         max_num_envs: the number of sub-environments of one environment.
-        max_total_sub_envs: the number of sub-environments of all environments, where a single
-            environment counts as one; None for four times max_num_envs.
         max_processes: the number of processes of all environments. Regardless of the number of
             cores, each takes 7 MB when it is created and 20 MB in use, two threads and 15 files,
             even when idle. The default suits a class in which everybody has sub-environments
             in processes.
         max_rollout_processes: the number of processes that play whole episodes, besides these; None
             for one per core, but none if max_processes is 0.
-        max_memory_mb: the memory of all environments in MiB, estimated in advance
-            (``memory_estimate``) and measured afterwards (``Account``). The default is half the
-            memory of a small machine.
         max_call_seconds: how long a call may take; 0 for no limit.
             The default is longer than ordinary calls, and short enough that the error is there
             after a coffee break.
@@ -52,10 +30,8 @@ class Limits:
 
     max_instances: int = 1000
     max_num_envs: int = 100_000
-    max_total_sub_envs: int | None = None
     max_processes: int = 128
     max_rollout_processes: int | None = None
-    max_memory_mb: int = 4096
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0
 
@@ -65,16 +41,16 @@ class Limits:
         wanted = self.max_rollout_processes
         return min(usable_cores() if wanted is None else wanted, self.max_processes)
 
-    def check_room(self, instances: int, taken: Room, more: Room) -> None:
+    def check_room(self, instances: int, left: int, workers: int) -> None:
         """Refuse an environment for which there is no room.
 
         Args:
             instances: the number of environments.
-            taken: their shares.
-            more: the share of the new one.
+            left: how many processes are left.
+            workers: how many of them the new one takes.
 
         Raises:
-            GymServerError: ``too_many_instances``, ``too_many_sub_envs``, ``too_many_processes``.
+            GymServerError: ``too_many_instances``, ``too_many_processes``.
         """
         if instances >= self.max_instances:
             raise GymServerError(
@@ -82,22 +58,11 @@ class Limits:
                 f"This server has {self.max_instances} environments, the most it allows",
                 "close some, GET /v1/instances/ lists them",
             )
-        most = self.max_total_sub_envs or 4 * self.max_num_envs
-        # An environment larger than max_num_envs gets its own error when it is created.
-        if taken.sub_envs + more.sub_envs > most and more.sub_envs <= self.max_num_envs:
-            raise GymServerError(
-                "too_many_sub_envs",
-                f"All environments together may have {most} sub-environments, and "
-                f"{max(0, most - taken.sub_envs)} are left, not {more.sub_envs}",
-                "close some, GET /v1/instances/ lists them; the server's option "
-                "--max-total-sub-envs sets the limit",
-            )
-        left = self.max_processes - taken.processes
-        if more.processes > max(0, left):
+        if workers > left:
             raise GymServerError(
                 "too_many_processes",
                 f"All environments together may have {self.max_processes} processes, and "
-                f"{max(0, left)} are left, not {more.processes}",
+                f"{left} are left, not {workers}",
                 "close some, GET /v1/instances/ lists them, or use fewer processes for sub-"
                 "environments (num_workers); the server's option --max-processes sets the limit",
             )

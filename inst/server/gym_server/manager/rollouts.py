@@ -18,7 +18,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from gym_server.errors import GymServerError, shutting_down
+from gym_server import memory
+from gym_server.errors import GymServerError, lacks_memory, shutting_down, too_much_memory
 from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
@@ -187,8 +188,18 @@ class Rollouts:
         busy = sum(player.request is not None for player in self._players)
         while len(self._players) < min(busy + waiting, self.most_processes):
             player = _Player()
+            thread = threading.Thread(
+                target=self._run, args=(player,), name="rollouts", daemon=True
+            )
+            try:
+                memory.start(thread)
+            except RuntimeError as error:
+                # There is no memory for its stack. If there are other players, they do the work.
+                for request in [] if self._players else list(self._requests):
+                    request.fail(0, too_much_memory(error))
+                    self._end_if_over(request)
+                return
             self._players.append(player)
-            threading.Thread(target=self._run, args=(player,), name="rollouts", daemon=True).start()
 
     def _run(self, player: _Player) -> None:
         try:
@@ -251,6 +262,10 @@ class Rollouts:
             done, result, error = self._call(player, request, units)
         except GymServerError as failure:
             error = failure
+        except Exception as failure:
+            if not lacks_memory(failure):
+                raise
+            error = too_much_memory(failure)
         with self._changed:
             player.request = None
             request.playing -= 1
@@ -324,19 +339,6 @@ class Rollouts:
                     continue
                 if request.unwanted_since < before:
                     process.kill(shutting_down())
-
-    def pids(self) -> list[int]:
-        """Return the numbers of the processes."""
-        with self._changed:
-            return [player.process.pid for player in self._players if player.process is not None]
-
-    def kill(self, pid: int, why: GymServerError) -> None:
-        """Kill a process; the request that it plays fails."""
-        with self._changed:
-            for player in self._players:
-                if player.process is not None and player.process.pid == pid:
-                    log.warning("%s", why.message)
-                    player.process.kill(why)
 
     def end(self) -> None:
         """Answer all requests with an error, and end all processes."""

@@ -9,10 +9,10 @@ import logging
 import threading
 import time
 
+from gym_server import memory
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
-from gym_server.processes import memory
 from gym_server.processes.worker_process import kill_overdue
 
 log = logging.getLogger(__name__)
@@ -21,16 +21,13 @@ log = logging.getLogger(__name__)
 _LONGEST_TICK = 1.0
 _SHARE_OF_LIMIT = 0.1
 
-# How often the memory of processes is measured, which takes some milliseconds.
-_MEASURE_SECONDS = 1.0
-
 # How often memory is returned to the system, which takes some milliseconds, and with many thousands
 # of sub-environments some tenths of a second.
 _GIVE_BACK_SECONDS = 30.0
 
 
 class Watchdog:
-    """Enforces the limits of time and memory."""
+    """Enforces the limits of time, and returns free memory."""
 
     def __init__(
         self,
@@ -48,7 +45,7 @@ class Watchdog:
         self._instances = instances
         self._rollouts = rollouts
         self._limits = limits
-        self._gave_back = self._measured = time.monotonic()
+        self._gave_back = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         thread.start()
@@ -72,9 +69,6 @@ class Watchdog:
         self._rollouts.kill_unwanted()
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
-        if time.monotonic() > self._measured + _MEASURE_SECONDS:
-            self._instances.evict_largest(self._rollouts)
-            self._measured = time.monotonic()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
             garbage, self._instances.left_garbage = self._instances.left_garbage, False
             memory.give_back(garbage)

@@ -2,7 +2,6 @@
 
 Starting a process takes 20 ms, and a second on Windows, so idle processes are kept here. A process
 that has run environments of other packages is not kept, because they may have left anything in it.
-Neither is one that has grown large.
 """
 
 from __future__ import annotations
@@ -10,23 +9,16 @@ from __future__ import annotations
 import threading
 import time
 
+from gym_server import memory
 from gym_server.processes.cores import usable_cores
-from gym_server.processes.memory import bytes_of
 from gym_server.processes.worker_process import WorkerProcess
-
-# A process that has drawn with MuJoCo keeps 110 MiB.
-_MOST_BYTES = 128 * 2**20
 
 # An idle process ends after this long.
 _IDLE_SECONDS = 600.0
 
 
 class Pool:
-    """Keeps at most as many processes as there are cores.
-
-    Attributes:
-        most_mb: the memory limit of each process in MiB; 0 for no limit.
-    """
+    """Keeps at most as many processes as there are cores."""
 
     def __init__(self, most: int | None = None, idle_seconds: float = _IDLE_SECONDS) -> None:
         """Start with no processes.
@@ -35,7 +27,6 @@ class Pool:
             most: how many to keep; None for one per core.
             idle_seconds: how long to keep an idle process.
         """
-        self.most_mb = 0
         self._most = usable_cores() if most is None else most
         self._idle_seconds = idle_seconds
         self._lock = threading.Lock()
@@ -55,7 +46,7 @@ class Pool:
             low_priority: whether it runs at a lower priority from now on, also for later users.
                 Such processes are not given to callers that did not ask for this.
         """
-        process = self._take_idle(low_priority) or WorkerProcess(self.most_mb)
+        process = self._take_idle(low_priority) or WorkerProcess()
         process.module = module
         if low_priority:
             process.lower_priority()
@@ -73,10 +64,9 @@ class Pool:
     def put(self, process: WorkerProcess) -> None:
         """Keep a process that has done its work, or end it if there are enough."""
         process.release()
-        is_small = bytes_of(process.pid, exactly=True) <= _MOST_BYTES
         with self._lock:
             self._idle = [one for one in self._idle if one[1].is_alive]
-            keeps = process.is_alive and is_small and len(self._idle) < self._most
+            keeps = process.is_alive and len(self._idle) < self._most
             if keeps:
                 self._idle.append((time.monotonic(), process))
             if keeps and self._timer is None:
@@ -87,9 +77,10 @@ class Pool:
     def _start_timer(self) -> None:
         oldest, _ = self._idle[0]
         left = oldest + self._idle_seconds - time.monotonic()
-        self._timer = threading.Timer(max(0.0, left), self._end_old)
-        self._timer.daemon = True
-        self._timer.start()
+        timer = threading.Timer(max(0.0, left), self._end_old)
+        timer.daemon = True
+        memory.start(timer)
+        self._timer = timer
 
     def _end_old(self) -> None:
         before = time.monotonic() - self._idle_seconds

@@ -18,17 +18,16 @@ from gym_server.processes.set_up import set_up_process
 progress: Any = [0, 0]
 
 
-def serve(calls: Connection, log_level: int, most_mb: int, shared_progress: Any) -> None:
+def serve(calls: Connection, log_level: int, shared_progress: Any) -> None:
     """Call functions, one after another, until the server closes the pipe or ends.
 
     Args:
         calls: receives one call after another.
         log_level: the lowest level to log to standard error.
-        most_mb: the memory limit of this process in MiB; 0 for no limit.
         shared_progress: two integers that the server can read.
     """
     global progress
-    set_up_process(log_level, most_mb)
+    set_up_process(log_level)
     progress = memoryview(shared_progress).cast("B").cast("q")
     pipe = Pipe(calls)
     while True:

@@ -10,16 +10,12 @@ import signal
 from gym_server import logs
 from gym_server.processes import start
 
-# What a process may use besides its environments: modules, and pictures by OpenGL.
-OWN_MB = 512
 
-
-def set_up_process(log_level: int, max_mb: int = 0) -> None:
-    """Make this process end with the server and log as the server does; limit its memory.
+def set_up_process(log_level: int) -> None:
+    """Make this process end with the server and log as the server does.
 
     Args:
         log_level: the lowest level to log to standard error.
-        max_mb: the memory limit of this process in MiB; 0 for no limit.
     """
     if hasattr(os, "setsid"):
         # So that processes which the environment starts can be killed with it, and Ctrl-C reaches
@@ -33,12 +29,3 @@ def set_up_process(log_level: int, max_mb: int = 0) -> None:
     with contextlib.suppress(OSError, ValueError, AttributeError):
         # Print where C code crashed.
         faulthandler.enable()
-    if max_mb:
-        _limit_memory(max_mb * 2**20)
-
-
-def _limit_memory(size: int) -> None:
-    # Not RLIMIT_AS: threads and libraries reserve address space that they never use.
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_DATA, (size, size))

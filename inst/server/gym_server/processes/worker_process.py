@@ -16,6 +16,7 @@ from multiprocessing import process as multiprocessing_process
 from multiprocessing.connection import wait
 from typing import Any, cast
 
+from gym_server import memory
 from gym_server.errors import GymServerError, call_too_long, environment_died, shutting_down
 from gym_server.processes import start
 from gym_server.processes.messages import CallPipe
@@ -59,12 +60,8 @@ class WorkerProcess:
         has_low_priority: whether it runs at a lower priority.
     """
 
-    def __init__(self, most_mb: int = 0) -> None:
-        """Start the process.
-
-        Args:
-            most_mb: its memory limit in MiB; 0 for no limit.
-        """
+    def __init__(self) -> None:
+        """Start the process."""
         self.module = ""
         self.has_low_priority = False
         self.why: GymServerError | None = None
@@ -90,13 +87,13 @@ class WorkerProcess:
         # Not a daemon: daemons may not start processes, and sub-environments can be processes.
         self._process = context.Process(
             target=serve,
-            args=(theirs, logging.getLogger().level, most_mb, self.progress),
+            args=(theirs, logging.getLogger().level, self.progress),
             daemon=False,
         )
         try:
             self._process.start()
             self.pid = cast(int, self._process.pid)
-            threading.Thread(target=self._await_end, daemon=True).start()
+            memory.start(threading.Thread(target=self._await_end, daemon=True))
             _alive.add(self)
         except BaseException:
             self._send_kill()
@@ -149,6 +146,11 @@ class WorkerProcess:
             with waiting():
                 return self._calls.finish()
         except _FAULTS:
+            raise self._ended_by() from None
+        except MemoryError:
+            # The rest of the result is still in the pipe.
+            self._fault = "the server has no memory for its result (--max-memory-mb)"
+            self._send_kill()
             raise self._ended_by() from None
         finally:
             self._since = None

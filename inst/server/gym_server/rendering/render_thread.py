@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from typing import TypeVar
 
+from gym_server import memory
 from gym_server.threads import calls
 
 ResultT = TypeVar("ResultT")
@@ -98,8 +99,9 @@ class RenderThread:
                     raise RuntimeError("nothing is drawn any more")
                 if self._thread is None:
                     # A daemon, so that drawing that never ends does not keep the process alive.
-                    self._thread = threading.Thread(target=self._work, name="render", daemon=True)
-                    self._thread.start()
+                    thread = threading.Thread(target=self._work, name="render", daemon=True)
+                    memory.start(thread)
+                    self._thread = thread
                 self._queue.put(job)
             yield job
 

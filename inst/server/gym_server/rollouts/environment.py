@@ -13,11 +13,9 @@ from gymnasium.spaces import Space
 from gymnasium.vector import VectorEnv
 
 from gym_server import logs, spaces
-from gym_server.budget import Budget
 from gym_server.envs import make, registry, wrappers
 from gym_server.envs.drawing_on_demand import save_drawing
 from gym_server.envs.extras import engine_versions
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.quick_choice import choose_quickly
 from gym_server.json_values import plain
 from gym_server.rollouts.task import Task
@@ -78,8 +76,7 @@ class RolloutEnv:
 
     def _make_own(self) -> VectorEnv | None:
         config = dataclasses.replace(self._task.config, num_envs=GROUP)
-        reservation = MemoryReservation(Budget(self._task.memory), GROUP)
-        own = make_own_implementation(config, self._task.allowed_modules, ThisThread(), reservation)
+        own = make_own_implementation(config, self._task.allowed_modules, ThisThread())
         if own is not None:
             # Policies act within the space. This check takes a sixth of a step.
             own.unwrapped.action_space.contains = lambda action: True  # type: ignore
@@ -87,9 +84,8 @@ class RolloutEnv:
 
     def _make(self) -> gymnasium.Env:
         task, config = self._task, self._task.config
-        reservation = MemoryReservation(Budget(task.memory))
-        env = make.make_env(config, task.allowed_modules, reservation)
-        env = make.call_env(wrappers.wrap, env, config.wrappers, ThisThread(), reservation)
+        env = make.make_env(config, task.allowed_modules)
+        env = make.call_env(wrappers.wrap, env, config.wrappers, ThisThread())
         # Some environments do work for drawing in each step.
         save_drawing(env)
         choose_quickly(env)

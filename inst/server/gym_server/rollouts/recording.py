@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Dict, Space, Tuple
 
-from gym_server.envs.memory_estimate import observation_bytes
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.task import MOST_BYTES, Keep
-from gym_server.spaces import stack, tensor_writer
+from gym_server.spaces import parts_of, stack, tensor_writer
 from gym_server.spaces.stacking import ARRAYS
 
 # The moments of observations with this many numbers together are computed at once, and then merged.
@@ -47,6 +47,13 @@ def _has_arrays(space: Space) -> bool:
             return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces.values()))
         case _:
             return isinstance(space, ARRAYS)
+
+
+def _bytes_of(space: Space) -> int:
+    """Return the size of a value whose parts are arrays."""
+    if isinstance(space, ARRAYS):
+        return math.prod(space.shape or ()) * np.dtype(space.dtype).itemsize
+    return sum(map(_bytes_of, parts_of(space)))
 
 
 class Moments:
@@ -110,7 +117,7 @@ class Recorder:
         self._flags: list[tuple[bool, bool]] = []
         self._complete = 0
         observations = 2 if keep.next_observation else 1
-        size = observations * observation_bytes(observation_space) + observation_bytes(action_space)
+        size = observations * _bytes_of(observation_space) + _bytes_of(action_space)
         self._most_steps = int(MOST_BYTES // max(1, size))
 
     def begin(self) -> None:

@@ -52,7 +52,6 @@ class Task:
     Attributes:
         config: the environment.
         allowed_modules: the modules that an env_id may import.
-        memory: the largest estimate for the environment in bytes.
         policy: the policy, as a JSON object.
         tensors: the policy's numbers by name.
         max_steps: after how many steps an episode is truncated; None for never.
@@ -61,7 +60,6 @@ class Task:
 
     config: EnvConfig
     allowed_modules: frozenset[str]
-    memory: float
     policy: dict = field(default_factory=dict)
     tensors: Mapping[str, np.ndarray] = field(default_factory=dict)
     max_steps: int | None = None

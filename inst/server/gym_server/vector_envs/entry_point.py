@@ -47,7 +47,6 @@ class EntryPointEnv:
     draws_in_process = True
     num_workers = None
     moved = None
-    pids = ()
 
     def __init__(self, env: VectorEnv, renderer: RenderThread) -> None:
         """Take over an environment.

@@ -11,11 +11,9 @@ from typing import Any, cast
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from gym_server.envs import argument_limits, make
+from gym_server.envs import make
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.extras import extra_of
-from gym_server.envs.memory_estimate import answer_bytes, environment_bytes, vector_bytes
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.registry import is_known, module_of
 from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
@@ -43,7 +41,6 @@ def make_vector_env(
     allowed_modules: Collection[str],
     max_num_envs: int,
     renderer: RenderThread,
-    memory: MemoryReservation,
 ) -> tuple[EntryPointEnv | SubEnvs, str]:
     """Make a vector environment.
 
@@ -52,7 +49,6 @@ def make_vector_env(
         allowed_modules: as for ``make.make_env()``.
         max_num_envs: the server's limit of sub-environments.
         renderer: the process's render thread.
-        memory: reserves its memory.
 
     Returns:
         The vector environment, and its vectorization_mode.
@@ -64,7 +60,7 @@ def make_vector_env(
     make.check_kwargs(config.kwargs or {})
     spec = make.find_spec(config.env_id, allowed_modules)
     _check(config, cast(int, config.num_envs), max_num_envs)
-    request = _request(spec, config, renderer, memory)
+    request = _request(spec, config, renderer)
     with make.naming_extra(spec):
         # Some environments have nothing else.
         only = "vector_entry_point" if spec.entry_point is None else None
@@ -82,10 +78,7 @@ def make_vector_env(
 
 
 def make_own_implementation(
-    config: EnvConfig,
-    allowed_modules: Collection[str],
-    renderer: Any,
-    memory: MemoryReservation,
+    config: EnvConfig, allowed_modules: Collection[str], renderer: Any
 ) -> VectorEnv | None:
     """Make an environment's own vector implementation; see ``make_vector_env()``.
 
@@ -93,19 +86,16 @@ def make_own_implementation(
         The vector environment; None if there is none that is known to play like the single one.
     """
     make.check_kwargs(config.kwargs or {})
-    request = _request(make.find_spec(config.env_id, allowed_modules), config, renderer, memory)
+    request = _request(make.find_spec(config.env_id, allowed_modules), config, renderer)
     return _try_entry_point(request) if _is_the_same_task(request) else None
 
 
-def _request(
-    spec: EnvSpec, config: EnvConfig, renderer: Any, memory: MemoryReservation
-) -> _Request:
+def _request(spec: EnvSpec, config: EnvConfig, renderer: Any) -> _Request:
     kwargs, num_envs = config.kwargs or {}, cast(int, config.num_envs)
     # What was asked for counts. Gymnasium would take the registered values instead.
     spec = copy.copy(spec)
     spec.kwargs = {k: v for k, v in spec.kwargs.items() if k not in _REGISTERED_BESIDE}
-    argument_limits.check_environment(spec, kwargs, config.wrappers, num_envs)
-    return _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer, memory)
+    return _Request(spec, config, parse_nonfinite(kwargs), num_envs, renderer)
 
 
 @dataclass(frozen=True)
@@ -117,7 +107,6 @@ class _Request:
     kwargs: dict
     num_envs: int
     renderer: Any
-    memory: MemoryReservation
 
     @property
     def autoreset_mode(self) -> AutoresetMode:
@@ -204,12 +193,12 @@ def _try_entry_point(request: _Request) -> VectorEnv | None:
     try:
         return _make_entry_point(request)
     except _NotPossibleError:
-        request.memory.give_back()
         return None
 
 
 def _require_entry_point(request: _Request) -> VectorEnv:
     reason = _why_no_entry_point(request)
+    _check_sizes(request)
     try:
         if reason is None:
             return _make_entry_point(request)
@@ -227,7 +216,6 @@ class _NotPossibleError(Exception):
 
 
 def _make_entry_point(request: _Request) -> VectorEnv:
-    request.memory.reserve(vector_bytes(request.spec, request.kwargs), request.spec.id)
     creator = make.load_creator(make.vector_spec(request.spec))
     try:
         render_mode = (
@@ -258,12 +246,20 @@ def _make_entry_point(request: _Request) -> VectorEnv:
         env.close()
         raise _NotPossibleError(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
     env.spec = _with_time_limit(request)
-    try:
-        request.memory.reserve(answer_bytes(env.single_observation_space), "What is observed")
-    except GymServerError:
-        env.close()
-        raise
     return env
+
+
+def _check_sizes(request: _Request) -> None:
+    """Refuse arguments with which Atari's implementation waits for ever."""
+    if not resets_each(request.spec):
+        return
+    for name in ("img_width", "img_height", "stack_num"):
+        if request.kwargs.get(name) == 0:
+            raise GymServerError("invalid_kwargs", f"'{name}' must be at least 1, not 0")
+    if request.kwargs.get("batch_size", 0) not in (0, request.num_envs):
+        raise GymServerError(
+            "invalid_kwargs", "'batch_size' must be left out: all sub-environments step together"
+        )
 
 
 def _why_no_argument(request: _Request, refusal: GymServerError) -> str:
@@ -298,14 +294,12 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
     render_mode = make.choose_render_mode(
         make.load_creator(request.spec), request.spec, request.config.render_mode
     )
-    request.memory.reserve(environment_bytes(request.spec, request.kwargs), request.spec.id)
     sub_env = SubEnv(
         request.spec,
         render_mode,
         request.kwargs,
         request.config.wrappers,
         request.renderer,
-        request.memory,
     )
     num_workers = choose_num_workers(request.config, request.spec)
     try:

@@ -10,7 +10,6 @@ from gymnasium.envs.registration import EnvSpec
 
 from gym_server.envs.config import Wrapper
 from gym_server.envs.make import load_creator, make_from_spec
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.envs.wrappers import wrap
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.copies import can_copy, copy_new
@@ -26,7 +25,6 @@ class SubEnv:
         kwargs: dict,
         wrappers: Sequence[Wrapper],
         renderer: RenderThread,
-        memory: MemoryReservation,
     ) -> None:
         """Keep the arguments; each call makes a sub-environment.
 
@@ -36,17 +34,14 @@ class SubEnv:
             kwargs: its arguments.
             wrappers: see ``wrappers.wrap()``.
             renderer: the render thread for making wrappers that draw.
-            memory: reserves the wrappers' memory for all sub-environments when the first one is
-                made.
         """
         self._make_args = spec, render_mode, kwargs
         self._wrappers = wrappers
         self._renderer: Any = renderer
-        self._memory: MemoryReservation | None = memory
 
     def __getstate__(self) -> dict:
-        """Leave out the render thread and the reservation, which stay in the server's process."""
-        return {**self.__dict__, "_renderer": ThisThread(), "_memory": None}
+        """Leave out the render thread, which stays in the server's process."""
+        return {**self.__dict__, "_renderer": ThisThread()}
 
     def prepare(self) -> None:
         """Import the environment's class; call once per process, before making any."""
@@ -54,8 +49,7 @@ class SubEnv:
 
     def __call__(self) -> gymnasium.Env:
         """Make a sub-environment."""
-        memory, self._memory = self._memory, None
-        return wrap(make_from_spec(*self._make_args), self._wrappers, self._renderer, memory)
+        return wrap(make_from_spec(*self._make_args), self._wrappers, self._renderer)
 
     def make_all(self, count: int) -> Iterator[gymnasium.Env]:
         """Make several, one by one; none may be played or drawn before the last one is made."""

@@ -18,7 +18,7 @@ from gymnasium.spaces import Space
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from gym_server import spaces
+from gym_server import memory, spaces
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError
@@ -141,7 +141,7 @@ class SubEnvs:
             )
         except GymServerError as refusal:
             self._kill_processes()
-            if refusal.code in ("environment_died", "call_too_long"):
+            if refusal.code in ("environment_died", "call_too_long", "too_much_memory"):
                 raise
             # Making one in this process has succeeded.
             raise GymServerError(
@@ -336,8 +336,8 @@ class SubEnvs:
 
         timer = threading.Timer(_CLOSE_SECONDS, end_overdue)
         timer.daemon = True
-        timer.start()
         try:
+            memory.start(timer)
             call_all((group, "close", ()) for group in self._groups)
         except BaseException:
             self._kill_processes()

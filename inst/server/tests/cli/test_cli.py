@@ -168,7 +168,12 @@ def _without_answer(call, url):
 
 
 @pytest.mark.parametrize(
-    ("option", "instead"), [("--isolate", "--users"), ("--max-worker-mb", "--max-memory-mb")]
+    ("option", "instead"),
+    [
+        ("--isolate", "--users"),
+        ("--max-worker-mb", "--max-memory-mb"),
+        ("--max-total-sub-envs", "--max-memory-mb"),
+    ],
 )
 def test_an_option_that_is_gone_names_what_replaces_it(option, instead, capsys):
     for written in ([option, "all"], [f"{option}=all"]):

@@ -33,7 +33,6 @@ def test_limits_of_time_are_numbers(name, value, capsys):
 @pytest.mark.parametrize(
     "name",
     [
-        "--max-total-sub-envs",
         "--max-processes",
         "--max-memory-mb",
     ],

@@ -9,7 +9,6 @@ from gym_server.envs import make, registry
 from gym_server.envs.atari import _GAMES, classic_game
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.make import find_spec
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 
 MALFORMED = "Attempted to look up malformed environment ID"
@@ -17,7 +16,7 @@ MALFORMED = "Attempted to look up malformed environment ID"
 
 def make_simple(env_id, render_mode, kwargs, allowed):
     config = EnvConfig(env_id, render_mode=render_mode, kwargs=kwargs)
-    return make.make_env(config, allowed, MemoryReservation())
+    return make.make_env(config, allowed)
 
 
 def refusal(env_id, render_mode=None, kwargs=None, allowed=()):

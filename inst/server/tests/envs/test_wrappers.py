@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from gym_server.envs import wrappers
-from gym_server.envs.argument_limits import check_wrapper
-from gym_server.envs.config import Wrapper
-from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import TENSORS, read
 
 
@@ -272,22 +269,12 @@ def test_a_wrapper_whose_library_is_missing_names_the_extra(client, monkeypatch)
     assert "opencv-python-headless" in refused["hint"]
 
 
-@pytest.mark.parametrize(
-    ("name", "kwargs"),
-    [
-        ("FrameStackObservation", {"stack_size": 10**9}),
-        ("FrameStackObservation", {"stack_size": "Infinity"}),
-        ("DelayObservation", {"delay": 10**9}),
-        ("ResizeObservation", {"shape": [10**6, 10**6]}),
-        ("DiscretizeObservation", {"bins": 10**9}),
-    ],
-)
-def test_no_wrapper_may_use_up_the_machine(name, kwargs):
-    # Only the check: without it, the real wrapper would take all memory.
-    with pytest.raises(GymServerError) as refusal:
-        check_wrapper(Wrapper(name, kwargs))
-    assert refusal.value.code == "invalid_kwargs"
-    assert "at most" in str(refusal.value)
+def test_there_are_only_so_many_wrappers(client, create):
+    one = wrapped("TimeLimit", max_episode_steps=9)
+    refused = refusal(client, *[one] * 33)
+    assert refused["code"] == "invalid_parameter"
+    assert "at most 32, not 33" in refused["message"]
+    create(wrappers=[one] * 32)
 
 
 def test_a_non_finite_argument_is_a_number(client):

@@ -14,6 +14,7 @@ from faulty_envs.hanging import (
     HangsWhenClosedElsewhere,
     Meeting,
 )
+from faulty_envs.hoarding import Hoards
 from faulty_envs.odd_spaces import (
     SPACES,
     CustomSpace,
@@ -53,6 +54,7 @@ for _kind in (
     Gated,
     Hanging,
     HangsWhenClosedElsewhere,
+    Hoards,
     Insists,
     KeepsItsArrays,
     KillsItself,

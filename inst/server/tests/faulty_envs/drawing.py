@@ -17,7 +17,7 @@ class Drawing(Counting):
 
     def __init__(self, frame="picture", render_mode=None, **kwargs):
         super().__init__(**kwargs)
-        self.frame, self.render_mode, self.hoard = frame, render_mode, []
+        self.frame, self.render_mode = frame, render_mode
 
     def close(self):
         self.threads.add(threading.get_ident())
@@ -28,8 +28,6 @@ class Drawing(Counting):
             time.sleep(3600)
         if self.frame == "raises":
             raise RuntimeError("out of paint")
-        if self.frame == "hoards":
-            self.hoard.append(np.ones(2**23))
         if self.frame == "nothing":
             return None
         return np.full((16, 32, 3), self.steps, dtype=np.uint8)

@@ -18,7 +18,6 @@ class Rogue(Counting):
     def __init__(self, does="nothing", at="step", render_mode=None, **kwargs):
         super().__init__(**kwargs)
         self.does, self.at, self.render_mode = does, at, render_mode
-        self.hoard = []
         self.act("constructor")
 
     def act(self, at):
@@ -83,12 +82,6 @@ class Rogue(Counting):
             time.sleep(8)
             os._exit(0)
         os._exit(8)
-
-    def hoards(self):
-        self.hoard.append(np.ones(2**27))
-
-    def grows(self):
-        self.hoard.append(np.ones(2**24))
 
     def never_returns(self):
         # No other thread of its process runs meanwhile.

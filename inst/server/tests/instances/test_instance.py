@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from gym_server.envs.config import EnvConfig
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.instances.factory import make_instance
 from gym_server.rendering.render_thread import RenderThread
 
@@ -302,7 +301,7 @@ def test_a_frame_shows_the_current_state(client, faulty):
 def test_a_frame_that_is_not_sent_yet_stays_as_it_is():
     # Others may step an environment while its frame is encoded.
     config = EnvConfig("KeepsItsArrays-v0")
-    how = ((), 1, RenderThread(), contextlib.ExitStack(), MemoryReservation())
+    how = ((), 1, RenderThread(), contextlib.ExitStack())
     instance = make_instance(config, *how)
     instance.reset(None, None)
     frame = instance.render()

@@ -5,8 +5,7 @@ import threading
 import pytest
 
 from gym_server.api.app import Config, create_app
-from gym_server.errors import GymServerError
-from gym_server.manager.limits import Limits, Room
+from gym_server.manager.limits import Limits
 from gym_server.vector_envs.sub_envs import SubEnvs
 
 pytestmark = pytest.mark.slow
@@ -65,36 +64,16 @@ def test_many_that_come_at_once_get_no_more(limited, gate, eventually):
 
 
 def test_what_could_not_be_made_takes_no_room(limited):
-    client = limited(max_instances=1, max_num_envs=4, max_total_sub_envs=4)
+    client = limited(max_instances=1, max_num_envs=4)
     for _ in range(3):
         assert make(client, env_id="NoSuch-v0").status_code == 400
         assert make(client, num_envs=4, kwargs={"none": 1}).status_code == 400
     assert make(client, num_envs=4).status_code == 200
 
 
-def test_all_together_have_only_so_many_sub_envs(limited):
-    client = limited(max_num_envs=8, max_total_sub_envs=10)
-    assert make(client, num_envs=8).status_code == 200
-    refusal = make(client, num_envs=3)
-    assert refused(refusal, "too_many_sub_envs")
-    assert refusal.json["message"] == (
-        "All environments together may have 10 sub-environments, and 2 are left, not 3"
-    )
-    assert "--max-total-sub-envs" in refusal.json["hint"]
-    # A single environment counts as one.
-    assert make(client).status_code == make(client).status_code == 200
-    assert refused(make(client), "too_many_sub_envs")
-
-
 def test_one_that_is_too_large_hears_of_that(limited):
     refusal = make(limited(max_num_envs=8), num_envs=9)
     assert refused(refusal, "too_many_sub_envs")
-
-
-def test_the_sub_envs_of_all_follow_those_of_one():
-    Limits(max_num_envs=100_000).check_room(0, Room(0), Room(100_000))
-    with pytest.raises(GymServerError, match="may have 400000 sub-environments"):
-        Limits(max_num_envs=100_000).check_room(4, Room(400_000), Room(1))
 
 
 def ask_for_processes(client, number):

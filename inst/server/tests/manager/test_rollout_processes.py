@@ -10,7 +10,6 @@ import pytest
 from rollout_requests import RANDOM, read_answer, refused, request_body, roll_out
 from running import descendants, is_running
 
-from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import kill_overdue
 from gym_server.protocol.safetensors import TENSORS
 
@@ -93,6 +92,10 @@ def test_what_would_end_a_thread_ends_an_episode(client, does):
     assert refused(client, [4, 5], **how)["code"] == "environment_error"
 
 
+def pids_of(rollouts):
+    return [one.process.pid for one in list(rollouts._players) if one.process is not None]
+
+
 def test_a_process_that_is_killed_changes_no_result(quick, eventually):
     app = quick(max_rollout_processes=2)
     client = app.test_client()
@@ -104,9 +107,9 @@ def test_a_process_that_is_killed_changes_no_result(quick, eventually):
         eventually(
             lambda: any(one.process and one.process.progress[0] for one in rollouts._players)
         )
-        pids = rollouts.pids()
-        os.kill(pids[0], signal.SIGKILL)
-        eventually(lambda killed=pids[0]: killed not in rollouts.pids())
+        killed = pids_of(rollouts)[0]
+        os.kill(killed, signal.SIGKILL)
+        eventually(lambda killed=killed: killed not in pids_of(rollouts))
     arrays, metadata = answer()
     assert metadata == {}
     assert arrays["return"].tolist() == expected["return"].tolist()
@@ -168,15 +171,12 @@ def test_a_process_that_loses_its_pipe_has_died(quick):
 
 def test_processes_are_used_again_by_the_next_rollout(quick, monkeypatch, eventually):
     monkeypatch.setattr("gym_server.manager.rollouts._IDLE_SECONDS", 0.05)
-    put = pool.put
-    # The memory of a process is measured before it is kept, which takes a while.
-    monkeypatch.setattr(pool, "put", lambda process: (time.sleep(0.3), put(process)))
     app = quick(max_rollout_processes=1)
     roll_out(app.test_client(), [1], **LAKE)
-    pids = app._rollouts.pids()
-    eventually(lambda: not app._rollouts.pids())
+    pids = pids_of(app._rollouts)
+    eventually(lambda: not pids_of(app._rollouts))
     roll_out(app.test_client(), [1], **LAKE)
-    assert app._rollouts.pids() == pids
+    assert pids_of(app._rollouts) == pids
 
 
 def test_the_end_of_a_server_ends_rollouts(serve, eventually):

@@ -1,6 +1,5 @@
 import os
 import signal
-import sys
 import threading
 from types import SimpleNamespace
 
@@ -9,7 +8,6 @@ import pytest
 from gymnasium.vector import AutoresetMode
 from running import is_running
 
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.processes.pool import Pool
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.sub_env import SubEnv
@@ -34,7 +32,7 @@ def warm(monkeypatch):
 
 def make(keeps_processes=True, env_id="Acrobot-v1", num_workers=2):
     spec = gymnasium.spec(env_id)
-    sub_env = SubEnv(spec, None, {}, (), RenderThread(), MemoryReservation())
+    sub_env = SubEnv(spec, None, {}, (), RenderThread())
     return SubEnvs(
         sub_env, 4, AutoresetMode.SAME_STEP, num_workers, RenderThread(), keeps_processes
     )
@@ -54,16 +52,6 @@ def test_a_process_runs_one_group_after_the_other(warm):
     assert sorted(third.pids) == sorted(pids)
     assert third.reset(3, None, None)[0].tolist() == start.tolist()
     third.close()
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is measured on Linux")
-def test_what_has_become_large_is_not_kept(warm, monkeypatch, eventually):
-    warm(most=2)
-    env = make()
-    pids = env.pids
-    monkeypatch.setattr("gym_server.processes.pool._MOST_BYTES", 2**20)
-    env.close()
-    eventually(lambda: not any(map(is_running, pids)))
 
 
 def test_no_more_than_so_many_are_kept(warm, eventually):

@@ -180,17 +180,6 @@ def _without_answer(server, url):
         return
 
 
-@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="Linux limits memory so")
-@pytest.mark.parametrize("limit", [("--max-memory-mb", "100")])
-def test_a_process_gets_no_more_memory_than_it_may_have(serve, limit):
-    server = serve(*limit)
-    url, _ = rogue(server, does="hoards")
-    status, answer = server.post(f"{url}/step/", {"action": [0]})
-    assert (status, answer["code"]) == (500, "environment_error")
-    assert "MemoryError" in answer["message"]
-    assert server.get("/v1/health/")[0] == 200
-
-
 def test_many_that_come_and_go_leave_nothing_behind(server, eventually):
     def left():
         files = len(os.listdir(f"/proc/{server.process.pid}/fd"))

@@ -9,7 +9,6 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 
 from gym_server.envs.config import Wrapper
 from gym_server.envs.extras import is_available
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
 from gym_server.vector_envs.sub_env import SubEnv
@@ -33,7 +32,7 @@ CASES = [(spec.id, kwargs) for spec in TOY_TEXT for kwargs in [{}, *KWARGS.get(s
 
 
 def sub_env(spec, render_mode=None, wrappers=(), **kwargs):
-    return SubEnv(spec, render_mode, kwargs, wrappers, RenderThread(), MemoryReservation())
+    return SubEnv(spec, render_mode, kwargs, wrappers, RenderThread())
 
 
 def made_by(env_id, count=3, render_mode=None, wrappers=(), **kwargs):

@@ -3,7 +3,6 @@ import gymnasium
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.vector_envs.group import Group
@@ -11,7 +10,7 @@ from gym_server.vector_envs.sub_env import SubEnv
 
 
 def group_of(env_id, numbers, mode):
-    sub_env = SubEnv(gymnasium.spec(env_id), None, {}, (), RenderThread(), MemoryReservation())
+    sub_env = SubEnv(gymnasium.spec(env_id), None, {}, (), RenderThread())
     return Group(sub_env, numbers, mode)
 
 

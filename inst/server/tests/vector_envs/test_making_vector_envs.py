@@ -418,3 +418,14 @@ def test_what_cannot_be_made_in_another_process_runs_in_this_one(client, monkeyp
         assert "num_workers 0" in answer.json["hint"]
     finally:
         del gymnasium.registry["faultyLocal-v0"], gymnasium.registry["faultyUnread-v0"]
+
+
+@pytest.mark.parametrize("name", ["stack_num", "img_height", "img_width"])
+def test_ataris_own_implementation_gets_no_argument_that_hangs_it(client, name):
+    pytest.importorskip("ale_py")
+    how = {"num_envs": 2, "vectorization_mode": "vector_entry_point"}
+    for kwargs, words in (({name: 0}, f"'{name}' must be"), ({"batch_size": 3}, "'batch_size'")):
+        body = {"env_id": "ALE/Pong-v5", "kwargs": kwargs, **how}
+        answer = client.post("/v1/envs/", json=body)
+        assert (answer.status_code, answer.json["code"]) == (400, "invalid_kwargs")
+        assert words in answer.json["message"]

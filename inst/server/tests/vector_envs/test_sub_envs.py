@@ -14,7 +14,6 @@ from gymnasium.vector import AutoresetMode
 from running import descendants, is_running
 from vector_play import MODES_SLOWLY, actions_of
 
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.errors import GymServerError
 from gym_server.processes.pool import Pool
 from gym_server.rendering.render_thread import RenderThread
@@ -32,7 +31,7 @@ def make():
 
     def make(name="Uneven", num_envs=3, num_workers=3, mode="NextStep", keep=False, **kwargs):
         spec = gymnasium.spec(f"{name}-v0")
-        sub_env = SubEnv(spec, None, kwargs, (), RenderThread(), MemoryReservation())
+        sub_env = SubEnv(spec, None, kwargs, (), RenderThread())
         mode = AutoresetMode(mode)
         made.append(SubEnvs(sub_env, num_envs, mode, num_workers, RenderThread(), keep))
         return made[-1]
@@ -231,7 +230,6 @@ def test_what_cannot_be_sent_is_refused(make):
 
 _DIES = """
 import sys, threading, time
-from gym_server.envs.memory_reservation import MemoryReservation
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import stack
 from gym_server.vector_envs.sub_env import SubEnv
@@ -240,7 +238,7 @@ from gymnasium.vector import AutoresetMode
 import gymnasium, faulty_envs, numpy
 if __name__ == "__main__":
     spec = gymnasium.spec("Hanging-v0")
-    sub_env = SubEnv(spec, None, {}, (), RenderThread(), MemoryReservation())
+    sub_env = SubEnv(spec, None, {}, (), RenderThread())
     env = SubEnvs(sub_env, 2, AutoresetMode.NEXT_STEP, 2, RenderThread())
     env.reset(None, None, None)
     actions = numpy.zeros(2, numpy.int64)

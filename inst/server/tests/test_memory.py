@@ -1,6 +1,7 @@
-"""Memory is returned to the system."""
+"""Memory is limited by the system, and returned to it."""
 
 import gc
+import os
 import subprocess
 import sys
 import weakref
@@ -8,8 +9,10 @@ import weakref
 import pytest
 from conftest import created
 
+from gym_server import memory
 from gym_server.manager import watchdog
-from gym_server.processes import memory
+
+needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
 
 
 class Circle:
@@ -31,7 +34,7 @@ def test_what_refers_to_itself_is_collected():
 # In separate processes, where nothing was freed before.
 RESIDENT = """
 import os, threading
-from gym_server.processes import memory
+from gym_server import memory
 
 def resident():
     with open("/proc/self/statm") as statm:
@@ -80,6 +83,51 @@ def test_what_threads_have_freed_does_not_stay(script):
         [sys.executable, "-c", RESIDENT + script], stdout=subprocess.PIPE, text=True, check=True
     )
     assert int(measured.stdout) < 8
+
+
+LIMITED = """
+import resource, sys
+from gym_server import memory
+
+memory.limit(100)
+try:
+    bytearray(101 * 2**20)
+except MemoryError:
+    print("too large")
+bytearray(50 * 2**20)
+# A limit that the process was given is kept.
+_, before = resource.getrlimit(resource.RLIMIT_DATA)
+memory.limit(200)
+assert resource.getrlimit(resource.RLIMIT_DATA) == (before, before)
+"""
+
+
+@needs_linux
+def test_the_system_limits_what_a_process_takes_from_then_on():
+    command = [sys.executable, "-c", LIMITED]
+    assert subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout == b"too large\n"
+
+
+def test_where_the_system_limits_nothing_the_log_says_so(monkeypatch, caplog):
+    monkeypatch.setattr(sys, "platform", "win32")
+    memory.limit(None)
+    assert not caplog.records
+    memory.limit(100)
+    assert "--max-memory-mb has no effect" in caplog.text
+
+
+@needs_linux
+def test_a_machine_has_what_its_cgroups_leave(tmp_path, monkeypatch):
+    whole = memory.machine_mb(tmp_path)
+    assert whole == os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20
+    (tmp_path / "memory").mkdir()
+    (tmp_path / "memory" / "memory.limit_in_bytes").write_text(f"{2**63 - 4096}\n")
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.machine_mb(tmp_path) == whole
+    (tmp_path / "memory" / "memory.limit_in_bytes").write_text(f"{50 * 2**20}\n")
+    assert memory.machine_mb(tmp_path) == 50
+    (tmp_path / "memory.max").write_text(f"{20 * 2**20}\n")
+    assert memory.machine_mb(tmp_path) == 20
 
 
 def test_the_watchdog_sees_to_it(monkeypatch, quick, eventually):
