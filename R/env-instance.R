@@ -71,7 +71,7 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
 
 # The codes of errors for an instance that was closed or removed.
 gone_codes <- c(
-  "unknown_instance", "instance_idle_closed", "instance_memory_closed", "call_too_long",
+  "unknown_instance", "instance_idle_closed", "call_too_long",
   "environment_died"
 )
 

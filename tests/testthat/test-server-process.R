@@ -9,7 +9,9 @@ test_that("the reason why a server has ended is found in its log", {
   expect_match(reason(1L, "Timeout (0:00:04)!", "Thread 1"), "`max_call_seconds`", fixed = TRUE)
   expect_identical(reason(-11L, "Fatal Python error: Aborted", "", "Thread 1"),
                    "Fatal Python error: Aborted")
-  expect_match(reason(-9L, "x"), "memory")
+  expect_match(reason(-9L, "x"), "max_memory_mb")
+  expect_match(reason(-6L, "terminate called after throwing an instance of 'std::bad_alloc'",
+                      "Fatal Python error: Aborted"), "max_memory_mb")
   expect_identical(reason(3L, "a", "b", "c", "d"), "Its exit status is 3.\nb\nc\nd")
   expect_null(reason(0L, "a"))
 })
