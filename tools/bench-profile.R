@@ -1,7 +1,7 @@
 # Where the microseconds of one single step of CartPole go, on both sides; medians over rounds,
 # in each of which everything is timed.
 #
-#   tools/in-env Rscript tools/bench-profile.R      writes vignettes/bench-profile.csv
+#   tools/in-env Rscript tools/bench-profile.R      writes vignettes/articles/bench-profile.csv
 
 library(gym)
 source("tools/bench/workers.R")
@@ -124,4 +124,4 @@ lines <- markdown(
 )
 cat(lines, sep = "\n")
 table$microseconds <- signif(table$microseconds, 3L)
-utils::write.csv(table, "vignettes/bench-profile.csv", row.names = FALSE)
+utils::write.csv(table, "vignettes/articles/bench-profile.csv", row.names = FALSE)

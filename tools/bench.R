@@ -3,15 +3,15 @@
 # alternating actions; whole episodes of ten environments by rollout(); what R's own calls add to a
 # step. All in one run, turn by turn.
 #
-#   make bench              half an hour; writes vignettes/bench.csv, vignettes/bench.md,
-#                           vignettes/bench.png and vignettes/bench-environments.png
+#   make bench              half an hour; writes bench.csv, bench.md, bench.png and
+#                           bench-environments.png into vignettes/articles/
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
 #   [beside] [wire] [memory] [tables] runs parts.
 #
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
-#                                vignettes/bench-gradients.csv and vignettes/bench-gradients.md.
+#                                bench-gradients.csv and bench-gradients.md there.
 #                                Only this part needs torch; see tools/bench/gradients.R, also for
 #                                how it is measured bit by bit
 
@@ -147,7 +147,7 @@ whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts
 if ("gradients" %in% parts) gradient_scale <- chosen_scale(arguments)
 kept <- if (!quick && identical(parts, "gradients")) "bench-gradients" else if (whole) "bench"
-folder <- if (is.null(kept)) "pictures" else "vignettes"
+folder <- if (is.null(kept)) "pictures" else "vignettes/articles"
 dir.create(folder, showWarnings = FALSE)
 at <- function(ending) file.path(folder, paste0(if (is.null(kept)) "bench" else kept, ending))
 result <- bench(parts, quick)
