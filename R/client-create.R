@@ -15,10 +15,8 @@
 #' idempotency key. If a connection breaks before the answer arrives, the client repeats the call
 #' with the same key. The server then returns its first answer and does nothing twice.
 #'
-#' A server that has only the protocol of gym-http-api, such as the original one, works with the
-#' classic calls. What it would ignore (`num_envs`, a seed of a reset) raises a `gym_error_http`
-#' with code `not_supported`. So do [gym_make()] and the functions that need it. Calls to such a
-#' server are not repeated if the connection breaks, because it would do them twice.
+#' The server must be this package's. On the original gym-http-api server, creating an environment
+#' raises a `gym_error_http` with code `not_supported`.
 #'
 #' @param remote_base The server's address, a string such as `"http://127.0.0.1:5000"`.
 #' @param timeout The time after which a call fails with `gym_error_connection`, in seconds. The

@@ -100,9 +100,7 @@ look_at_space <- function(check, kind) {
 
 look_at_part <- function(check, space, path) {
   note <- function(...) note_finding(check, "spaces", paste0(...), severity = "note")
-  if (inherits(space, "gym_space_undescribed")) {
-    note("The server gives only the name of `", path, "`, ", space$name, ".")
-  } else if (has_parts(space)) {
+  if (has_parts(space)) {
     if (!length(space$spaces)) {
       note("`", path, "` is a ", space$name, " without parts.")
     }

@@ -232,7 +232,7 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
   check_flag(render)
   instance <- known_instance(x, instance_id)
-  if (render && !instance$classic) {
+  if (render) {
     watch_once(instance)
   }
   step_instance(instance, action, which, render)

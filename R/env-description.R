@@ -79,12 +79,12 @@ rollouts_route <- "/v1/rollouts/"
 
 described_env <- function(client, answer, fields, wrappers, arguments) {
   check_description(answer)
-  observed <- read_space(answer, "observation_space", new_space)
+  observed <- read_space(answer, "observation_space")
   observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
   num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
   structure(
     list(
-      observation_space = observed, action_space = read_space(answer, "action_space", new_space),
+      observation_space = observed, action_space = read_space(answer, "action_space"),
       num_envs = num_envs, one_seed = !is.null(answer$group), client = client,
       spec = c(
         read_spec(answer$env_id, answer$spec),

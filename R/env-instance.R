@@ -34,12 +34,18 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   instance_id <- answer$instance_id
   ready <- FALSE
   on.exit(if (!ready) close_unused(client, instance_id))
-  if (!is.null(answer$action_space)) {
-    instances <- client_state(client)$instances
-    instances[[instance_id]] <- new_instance(client, instance_id, answer)
-  } else if (isTRUE(client_state(client)$classic)) {
-    check_classic_fields(client, fields, c("env_id", "seed"), call)
+  if (is.null(answer$action_space)) {
+    gym_abort(
+      c(
+        paste0("The server at ", client$remote_base, " is an old one, such as that of ",
+               "gym-http-api: it does not describe its environments."),
+        i = "`gym_server_start()` starts this package's server, which the same calls play on."
+      ),
+      class = "gym_error_http", code = "not_supported", call = call
+    )
   }
+  instances <- client_state(client)$instances
+  instances[[instance_id]] <- new_instance(client, instance_id, answer)
   if (identical(render_mode, "human")) {
     watch_once(known_instance(client, instance_id, call), call)
   }
@@ -83,20 +89,17 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   if (is.null(instances[[instance_id]])) {
     # Not at each call: to ask whether the server runs takes a tenth of a step.
     check_not_ended(client, instance_id, call)
-    answer <- tryCatch(
-      get_answer(client, instance_route(instance_id), call = call),
-      gym_error_http_404 = function(cnd) classic_description(client, instance_id, cnd, call)
-    )
+    answer <- get_answer(client, instance_route(instance_id), call = call)
     instances[[instance_id]] <- new_instance(client, instance_id, answer)
   }
   instances[[instance_id]]
 }
 
 # Calling handlers, such as those of read_values(), do not run after a stack overflow.
-read_space <- function(answer, name, space_of) {
+read_space <- function(answer, name) {
   what <- paste0("Its `", name, "`")
   tryCatch(
-    read_values(space_of(answer[[name]]), what),
+    read_values(new_space(answer[[name]]), what),
     stackOverflowError = function(cnd) abort_answer(paste(what, "is nested too deeply"))
   )
 }
@@ -146,22 +149,19 @@ new_instance <- function(client, instance_id, about) {
   instance$client <- client
   instance$id <- instance_id
   instance$route <- instance_route(instance_id)
-  instance$classic <- isTRUE(about$classic)
   instance$num_envs <- about$num_envs
   instance$num_workers <- about$num_workers
   instance$vectorization_mode <- shown_line(about$vectorization_mode)
   instance$autoreset_mode <- shown_line(about$autoreset_mode)
-  space_of <- if (instance$classic) new_classic_space else new_space
-  instance$single_action_space <- read_space(about, "action_space", space_of)
-  observed <- read_space(about, "observation_space", space_of)
+  instance$single_action_space <- read_space(about, "action_space")
+  observed <- read_space(about, "observation_space")
   observed$names <- observation_names(about$env_id, observed, wrappers_of(about))
   instance$single_observation_space <- observed
   instance$name_observation <- naming(observed, batch = !is.null(about$num_envs))
   instance$actions <- sent_space(instance$single_action_space, about$num_envs)
   instance$observations <- sent_space(observed, about$num_envs)
-  as_tensors <- function(space) !instance$classic && travels_as_tensors(space, about$num_envs)
-  instance$takes_tensors <- as_tensors(observed)
-  instance$sends_tensors <- as_tensors(instance$single_action_space)
+  instance$takes_tensors <- travels_as_tensors(observed, about$num_envs)
+  instance$sends_tensors <- travels_as_tensors(instance$single_action_space, about$num_envs)
   instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
   instance$done <- FALSE
@@ -199,7 +199,7 @@ warn_as_gymnasium <- function(answer) {
   }
 }
 
-# The names of the wrappers around an instance, which classic servers do not send.
+# The names of the wrappers around an instance.
 wrappers_of <- function(about) {
   as.character(unlist(lapply(about$wrappers, function(wrapper) wrapper["name"])))
 }

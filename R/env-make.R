@@ -144,9 +144,6 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
     ),
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
-  if (isTRUE(client_state(client)$classic)) {
-    abort_classic(client, "the classic calls, such as `env_create()`, and no `gym_make()`", call)
-  }
   env <- server_env$new(client, instance_id, wrappers$server, kwargs)
   for (wrapper in wrappers$r) {
     env <- wrap_server_env(env, wrapper[[1L]], wrapper[-1L], call)

@@ -79,9 +79,6 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   single <- instance[[paste0("single_", which)]]
   num_envs <- instance$num_envs
   space <- sent_space(single, num_envs)
-  if (instance$classic) {
-    return(fits_space(space, value, bounds = TRUE))
-  }
   if (!fits_space(space, value)) {
     return(FALSE)
   }

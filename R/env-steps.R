@@ -17,9 +17,6 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
     },
     reset_mask = mask_json(mask, instance, call)
   )
-  if (instance$classic) {
-    check_classic_fields(client, fields, NULL, call)
-  }
   # A place for each combination of the flags.
   slot <- 1L + named + 2L * infos
   request <- instance$resets[[slot]]
@@ -38,7 +35,7 @@ prepare_reset <- function(instance, named, infos) {
     info <- read_info(answer, instance$num_envs)
     list(observation = read_observation(answer), info = info)
   }
-  prepare_instance_request(instance, "reset/", info_field(instance, infos), named, read)
+  prepare_instance_request(instance, "reset/", info_field(infos), named, read)
 }
 
 #' Take a step
@@ -71,8 +68,8 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
 
 prepare_step <- function(instance, which, render, named, infos, finals) {
   fields <- c(
-    render = if (render) "true" else "false", info_field(instance, infos),
-    final_obs = if (!finals && !instance$classic) "false"
+    render = if (render) "true" else "false", info_field(infos),
+    final_obs = if (!finals) "false"
   )
   if (is.null(instance$num_envs)) {
     prepare_single_step(instance, fields, named)
@@ -81,8 +78,8 @@ prepare_step <- function(instance, which, render, named, infos, finals) {
   }
 }
 
-# The field that tells a server to make no infos. Classic servers do not know it.
-info_field <- function(instance, infos) if (!infos && !instance$classic) c(info = "false")
+# The field that tells a server to make no infos.
+info_field <- function(infos) if (!infos) c(info = "false")
 
 #' Prepare the requests to one of an instance's routes
 #' @param body,sends_tensors As for [prepare_request()].
@@ -115,14 +112,11 @@ prepare_single_step <- function(instance, fields, named) {
     body = if (sends) new_tensors_body(fields) else new_json_body(fields),
     sends_tensors = sends
   )
-  general <- sends || instance$classic
-  request$write <- if (general) function(action) NULL else json_writer(actions)
-  # A classic server's error does not say that an action was wrong, so check bounds here.
-  bounds <- instance$classic && inherits(actions, "gym_space_discrete")
+  request$write <- if (sends) function(action) NULL else json_writer(actions)
   request$check_and_write <- function(action, call) {
     action <- numbered_actions(instance, action, call)
     action <- action_by_name(instance$single_action_space, action, instance$spec$id, call)
-    check_value(actions, action, "", call, bounds)
+    check_value(actions, action, "", call)
     if (sends) {
       to_tensors(actions, action, "action", call)
     } else {
@@ -134,19 +128,15 @@ prepare_single_step <- function(instance, fields, named) {
 
 # Makes the function that reads the answer to a step of a single environment.
 step_reader <- function(instance, read_observation) {
-  classic <- instance$classic
   function(answer) {
     if (!is.null(answer$tensors)) {
       check_answer_results(answer$tensors, 1L)
       answer[flags_and_reward] <- answer$tensors[flags_and_reward]
       answer$done <- answer$terminated || answer$truncated
-    } else if (classic) {
-      answer <- classic_flags(answer)
     }
     for (name in c("done", "terminated", "truncated")) {
       flag <- answer[[name]]
-      right <- isTRUE(flag) || isFALSE(flag) || is.null(flag) && name != "done"
-      if (!right) refuse_field(flag, name, "true or false")
+      if (!isTRUE(flag) && !isFALSE(flag)) refuse_field(flag, name, "true or false")
     }
     info <- read_info(answer, NULL)
     observation <- read_observation(answer)

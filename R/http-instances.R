@@ -46,7 +46,8 @@ create_once <- function(client, state, fields, call) {
   )
   check_instance_id(answer$instance_id)
   suspendInterrupts({
-    note_protocol(state, answer)
+    # Says by a text which server it is.
+    state$server <- string_or_null(answer$server)
     remember_instance(
       instance_place(client, answer$instance_id), client, answer$instance_id,
       env_id = shown_line(answer$env_id)

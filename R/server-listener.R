@@ -2,36 +2,23 @@
 
 #' Find out what listens at an address
 #'
-#' Calls a route that every Gym server has, including a classic one.
+#' No token is sent, because it may be another program.
 #' @param timeout The time for the answer, in seconds. A server that accepts connections but does
 #'   not answer in time still counts as listening.
-#' @param token The token of a server that is known to be ours. Other programs get none.
-#' @return A list of `listens`, `is_gym` and `asks_token` (whether it needs a token, or another one;
-#'   all three are logical), `status` (of the answer), `name` (of the program, by its own account, a
-#'   string or `NULL`), `instances` (their number on a Gym server) and `problem` (why there is no
-#'   answer, a string or `NULL`).
+#' @return A list of `listens` and `is_gym` (logical) and `name` (of the program, by its own
+#'   account, a string or `NULL`).
 #' @noRd
-probe_server <- function(base, timeout, token = NULL) {
-  client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE), token)
-  problem <- NULL
+probe_server <- function(base, timeout) {
+  client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE))
   response <- tryCatch(
-    any_response(client, "/v1/envs/", "GET"),
-    gym_error_connection = function(cnd) {
-      problem <<- conditionMessage(cnd)
-      NULL
-    }
+    any_response(client, "/v1/envs/", "GET"), gym_error_connection = function(cnd) NULL
   )
   times <- curl::handle_data(client$state$connection$handles$get$curl)$times
-  envs <- response$answer$all_envs
-  asks_token <- identical(response$answer$code, "unauthorized")
+  answer <- response$answer
   list(
     listens = !is.null(response) || times[["connect"]] > 0,
-    is_gym = !is.null(envs) || asks_token,
-    status = response$status_code,
-    asks_token = asks_token,
-    name = if (!is.null(response)) server_name(response),
-    instances = length(envs),
-    problem = problem
+    is_gym = !is.null(answer$all_envs) || identical(answer$code, "unauthorized"),
+    name = if (!is.null(response)) server_name(response)
   )
 }
 

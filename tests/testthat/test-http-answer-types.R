@@ -33,16 +33,18 @@ test_that("an instance id is a string that an address can hold", {
   }
 })
 
-test_that("a step's answer of classic servers is taken", {
+test_that("an old server, which does not describe its environments, is named", {
+  server <- local_bad_environment()
+  say(server, "/v1/envs/" = answers('{"instance_id":"0a1b2c3d"}'))
+  error <- expect_error(env_create(server, "CartPole-v0"), "gym_server_start()", fixed = TRUE,
+                        class = "gym_error_http")
+  expect_identical(error$code, "not_supported")
+  expect_error(gym_make("CartPole-v1", client = server), "old one", class = "gym_error_http")
+})
+
+test_that("a step's answer may have numbers that are none", {
   server <- local_bad_environment()
   env_reset(server, "0a1b2c3d")
-  say(server, "/v1/envs/0a1b2c3d/step/" = answers(
-    '{"observation":[0,1],"reward":1,"done":false,"info":{}}'
-  ))
-  out <- env_step(server, "0a1b2c3d", 1)
-  expect_identical(out$reward, 1)
-  expect_false(out$done)
-  expect_null(out$terminated)
   words <- good_step(reward = '"NaN"', observation = '["Infinity","NaN"]', info = '{"a":"NaN"}')
   say(server, "/v1/envs/0a1b2c3d/step/" = answers(words))
   out <- env_step(server, "0a1b2c3d", 1)

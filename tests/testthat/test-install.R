@@ -117,7 +117,7 @@ test_that("packages come with their hashes, and none is built", {
   expect_identical(suppressMessages(gym_server_install("box2d")), environment_python(folder))
   expect_match(calls_of(uv), paste0(
     "^--directory .* pip sync --python .*/venv/bin/python --require-hashes --no-build ",
-    ".*/base.txt .*/box2d.txt .*/atari.txt$"
+    "--compile-bytecode .*/base.txt .*/box2d.txt .*/atari.txt$"
   ))
 })
 

@@ -34,10 +34,8 @@ test_that("it is found out who listens", {
   expect_false(nobody$is_gym)
 
   server <- local_server()
-  id <- env_create(server, "CartPole-v1")
-  gym <- probe_server(server$remote_base, timeout = 5, known_token(server$remote_base))
+  gym <- probe_server(server$remote_base, timeout = 5)
   expect_true(gym$listens && gym$is_gym)
-  expect_identical(gym$instances, 1L)
 
   stranger <- probe_server(paste0("http://127.0.0.1:", local_stranger("Fish/1.0")), timeout = 5)
   expect_true(stranger$listens)
@@ -52,7 +50,6 @@ test_that("who takes connections but does not answer listens", {
   silent <- probe_server(paste0("http://127.0.0.1:", port), timeout = 0.3)
   expect_true(silent$listens)
   expect_false(silent$is_gym)
-  expect_match(silent$problem, "No answer")
 })
 
 test_that("asking who listens leaves R's generator alone", {
