@@ -5,24 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import socket
-from collections.abc import Iterator
-from pathlib import Path
 
 from gym_server.api.access import is_loopback
-from gym_server.cli.options import parser
 from gym_server.cli.token_file import VARIABLE
 from gym_server.front.folders import Folders
 from gym_server.front.front import Front
 from gym_server.front.starts import ShareError, Starts, Wishes
 from gym_server.front.users_file import UsersFile, UsersFileError
-
-# The options that are about the front, or that it decides for its servers.
-_OF_THE_FRONT = frozenset(
-    {
-        *("users", "host", "port", "allow_host", "token_file", "no_auth"),
-        *("stop_on_stdin_eof", "monitor_dir", "max_memory_mb", "max_processes"),
-    }
-)
+from gym_server.manager.limits import Limits
 
 
 class BadUsersError(Exception):
@@ -63,26 +53,18 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
 
 
 def _wishes(options: argparse.Namespace) -> Wishes:
-    defaults = vars(parser().parse_args([]))
-    given = {name: value for name, value in vars(options).items() if value != defaults[name]}
     hosts = list(options.allow_host)
     if not is_loopback(options.host):
         hosts.append(socket.getfqdn())
-    arguments = [f"--allow-host={name}" for name in hosts] + ["--monitor-dir=."]
-    for name in given.keys() - _OF_THE_FRONT:
-        arguments += _as_arguments(f"--{name.replace('_', '-')}", given[name])
-    return Wishes(
-        arguments,
-        given.get("max_memory_mb"),
-        given.get("max_processes"),
-        options.max_rollout_processes,
-    )
-
-
-def _as_arguments(option: str, value: object) -> Iterator[str]:
-    if value is True:
-        yield option
-        return
-    for one in value if isinstance(value, list) else [value]:
-        # A server has another working directory.
-        yield f"{option}={one.resolve() if isinstance(one, Path) else one}"
+    processes, rollouts = options.max_processes, options.max_rollout_processes
+    arguments = [
+        *(f"--allow-host={name}" for name in hosts),
+        *(f"--allow-module={name}" for name in options.allow_module),
+        *(f"--max-rollout-processes={number}" for number in (rollouts,) if number is not None),
+        f"--max-call-seconds={options.max_call_seconds}",
+        f"--idle-minutes={options.idle_minutes}",
+        f"--log-level={options.log_level}",
+        "--monitor-dir=.",
+    ]
+    own_processes = None if processes == Limits.max_processes else processes
+    return Wishes(arguments, options.max_memory_mb, own_processes, rollouts)
