@@ -36,7 +36,7 @@ is_running <- function(base) {
 #'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
 #'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an
 #'   unused environment is removed (1,440; 0 for never).
-#'   * `vignette("server", package = "gym")` describes the options of a server for a group:
+#'   * `vignette("server", package = "gym")` describes the options of a server that others reach:
 #'   `allow_host`, `no_auth`.
 #' @param timeout The time for the start, in seconds. The default is 60.
 #' @param token Should the server require its own token? `TRUE` or `FALSE`. Only this session knows

@@ -42,7 +42,7 @@ class Config:
         monitor_dir: where monitors write; None for a new temporary directory.
         allowed_modules: the modules that an env_id may import.
         max_body_bytes: the size of the largest request.
-        limits: the limits for all clients together.
+        limits: the limits.
         stop: asks the server to stop after answering the requests in progress.
         access: which requests the server accepts.
         is_private: whether its clients may name files as arguments of environments, and have
