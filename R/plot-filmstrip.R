@@ -16,43 +16,43 @@ filmstrip_picture <- function(x, episode, n, candidate, call = rlang::caller_env
   filmstrip(stills)
 }
 
+# A panel for each frame.
 filmstrip <- function(stills) {
   pictures <- crop_blank(lapply(stills$frames, unclass))
-  grob_picture(grid::gTree(pictures = pictures, steps = stills$steps, cl = "gym_filmstrip"))
-}
-
-# The arrangement of frames depends on the space available, which is known only when drawing.
-#' @exportS3Method grid::makeContent
-makeContent.gym_filmstrip <- function(x) { # nolint: object_name_linter.
-  room <- grid::unit(1, "npc")
-  inches <- c(grid::convertWidth(room, "in", TRUE), grid::convertHeight(room, "in", TRUE))
-  aspect <- ncol(x$pictures[[1L]]) / nrow(x$pictures[[1L]])
-  strip <- arrange_stills(length(x$pictures), aspect, inches)
-  drawn <- lapply(seq_along(x$pictures), function(i) {
-    draw_still(x$pictures[[i]], x$steps[[i]], i, strip, inches)
-  })
-  grid::setChildren(x, do.call(grid::gList, drawn))
-}
-
-draw_still <- function(picture, step, i, strip, inches) {
-  left <- (inches[[1L]] - strip$columns * strip$cell[[1L]] + strip$gap) / 2 +
-    ((i - 1) %% strip$columns) * strip$cell[[1L]]
-  top <- (inches[[2L]] + strip$rows * strip$cell[[2L]]) / 2 -
-    ((i - 1) %/% strip$columns) * strip$cell[[2L]] - strip$label
-  inch <- function(x) grid::unit(x, "in")
-  raster <- as.raster(new_frame(shrink(picture, device_shrinkage(picture, strip$width))))
-  place <- list(
-    x = inch(left), y = inch(top), width = inch(strip$width), height = inch(strip$height),
-    just = c("left", "top")
-  )
-  grid::grobTree(
-    do.call(grid::rasterGrob, c(list(raster), place)),
-    do.call(grid::rectGrob, c(place, list(gp = grid::gpar(col = "grey70", fill = NA, lwd = 0.8)))),
-    grid::textGrob(
-      paste("step", step), inch(left), inch(top + 0.45 * strip$label), just = c("left", "centre"),
-      gp = grid::gpar(fontsize = strip$fontsize)
+  width <- ncol(pictures[[1L]])
+  height <- nrow(pictures[[1L]])
+  names <- factor(paste("step", stills$steps), paste("step", stills$steps))
+  frame_layer <- function(picture, name) {
+    ggplot2::layer(
+      geom = ggplot2::GeomRasterAnn, stat = "identity", position = "identity",
+      data = data.frame(step = name), inherit.aes = FALSE,
+      params = list(
+        raster = as.raster(new_frame(shrink(picture, max(1L, width %/% most_pixels)))),
+        xmin = 0, xmax = width, ymin = 0, ymax = height, interpolate = TRUE
+      )
     )
-  )
+  }
+  ggplot2::ggplot() +
+    ggplot2::geom_blank(
+      ggplot2::aes(.data$x, .data$y), data.frame(x = c(0, width), y = c(0, height))
+    ) +
+    Map(frame_layer, pictures, as.list(names)) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$step), ncol = film_columns(pictures)) +
+    ggplot2::scale_x_continuous(expand = c(0, 0)) +
+    ggplot2::scale_y_continuous(expand = c(0, 0)) +
+    ggplot2::coord_fixed() +
+    theme_gym_bare() +
+    ggplot2::theme(
+      panel.border = ggplot2::element_rect(colour = "grey70", fill = NA),
+      strip.text = ggplot2::element_text(margin = ggplot2::margin(2, 2, 2, 2)),
+      plot.margin = ggplot2::margin(2, 2, 2, 2)
+    )
+}
+
+# As many frames in a row as are still large.
+film_columns <- function(pictures) {
+  wide <- ncol(pictures[[1L]]) > 2 * nrow(pictures[[1L]])
+  min(length(pictures), if (wide) 2L else 4L)
 }
 
 #' Crop the blank border that all frames share
@@ -79,15 +79,9 @@ busy_span <- function(busy) {
   seq(max(1, min(which(busy)) - around), min(length(busy), max(which(busy)) + around))
 }
 
-# Pixel devices drop most pixels of a large picture, and thin lines with them. For these it is made
-# smaller first, by this factor.
-device_shrinkage <- function(picture, inches) {
-  if (names(grDevices::dev.cur()) %in% c("pdf", "postscript", "svg", "cairo_pdf", "cairo_ps")) {
-    return(1L)
-  }
-  pixels <- inches * grDevices::dev.size("px")[[1L]] / grDevices::dev.size("in")[[1L]]
-  max(1L, as.integer(ncol(picture) / pixels))
-}
+# Devices drop most pixels of a large picture, and thin lines with them, so it is made smaller
+# first: it keeps this width or up to twice as much.
+most_pixels <- 300L
 
 #' Make a picture smaller: each pixel the mean of a square
 #' @noRd
@@ -106,45 +100,10 @@ shrink <- function(picture, by) {
         c(size, dim(picture)[[3L]]))
 }
 
-#' Arrange frames so that they are as large as possible
-#'
-#' Full rows look better, if the frames do not become much smaller.
-#' @param aspect Width divided by height of a frame.
-#' @param inches Width and height of the page.
-#' @return A list, in inches except for the counts: `columns`, `rows`, `width` and `height` of a
-#'   frame, `label` (the height of the label above it), `gap` (between two frames), `cell` (total
-#'   width and height), and `fontsize` of the label.
-#' @noRd
-arrange_stills <- function(n, aspect, inches) {
-  columns <- seq_len(n)
-  rows <- ceiling(n / columns)
-  full <- columns * rows == n
-  of_columns <- function(columns, rows) {
-    width <- inches[[1L]] / columns
-    min(width, aspect * (inches[[2L]] / rows - label_room(width / aspect)))
-  }
-  widths <- mapply(of_columns, columns, rows)
-  good <- full & widths >= 2 / 3 * max(widths)
-  best <- if (any(good)) which(good)[which.max(widths[good])] else which.max(widths)
-  width <- max(widths[[best]], 0.1)
-  gap <- 0.04 * width
-  label <- label_room(width / aspect)
-  picture <- width - gap
-  list(
-    columns = columns[[best]], rows = rows[[best]], width = picture, height = picture / aspect,
-    label = label, gap = gap, cell = c(width, picture / aspect + label + gap / 2),
-    fontsize = 10 * label / 0.22
-  )
-}
-
-# The height of the label above a frame: proportional to the frame, but never too small to read.
-label_room <- function(height) min(max(0.2 * height, 0.13), 0.22)
-
 # The size of a filmstrip on paper: as wide as the text of a page.
 filmstrip_size <- function(stills, width = 6.5) {
-  picture <- crop_blank(lapply(stills$frames, unclass))[[1L]]
-  n <- length(stills$steps)
-  columns <- min(4L, n)
-  rows <- ceiling(n / columns)
-  c(width, rows * (width / columns * nrow(picture) / ncol(picture) + 0.25))
+  pictures <- crop_blank(lapply(stills$frames, unclass))
+  columns <- film_columns(pictures)
+  rows <- ceiling(length(pictures) / columns)
+  c(width, rows * (width / columns * nrow(pictures[[1L]]) / ncol(pictures[[1L]]) + 0.25))
 }

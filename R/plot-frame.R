@@ -18,14 +18,10 @@
 #' env$close()
 autoplot.gym_frame <- function(object, ...) {
   check_dots_empty(...)
-  grob_picture(grid::rasterGrob(as.raster(object)))
-}
-
-# A picture without axes: all space is for what `grid` draws.
-grob_picture <- function(grob) {
+  # A picture without axes.
   ggplot2::ggplot(data.frame(x = 0:1, y = 0:1), ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_blank() +
-    ggplot2::annotation_custom(grob) +
+    ggplot2::annotation_custom(grid::rasterGrob(as.raster(object))) +
     theme_gym_bare() +
     ggplot2::theme(plot.margin = ggplot2::margin(2, 2, 2, 2))
 }

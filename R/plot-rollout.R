@@ -23,9 +23,9 @@
 #' shown. This needs a rollout with `steps = TRUE`. If a wrapper changes observations, as
 #' `NormalizeObservation` does, the labels are `obs_1` and so on, without limits.
 #'
-#' `"filmstrip"` shows evenly spaced frames of an episode, including the first and the last, in rows
-#' if that makes them larger. Blank space above and below is cut off if all frames have it. This
-#' needs a rollout with `frames = TRUE`, and the package png.
+#' `"filmstrip"` shows evenly spaced frames of an episode, including the first and the last, four in
+#' a row, or two if they are wide. Blank space around is cut off if all frames have it. This needs a
+#' rollout with `frames = TRUE`, and the package png.
 #'
 #' @param x,object The result of [rollout()]. You may give it another name, which is then the name
 #'   of its row: `plot(random = played_1, network = played_2)`.

@@ -33,30 +33,18 @@ test_that("a smaller picture has the mean of each square", {
   expect_identical(shrink(picture, 1L), picture)
 })
 
-test_that("pictures are arranged so that they are large and fit", {
-  wide <- arrange_stills(8, 1.5, c(12, 1.3))
-  expect_identical(c(wide$columns, wide$rows), c(8, 1))
-  square <- arrange_stills(8, 1.5, c(7, 5))
-  expect_identical(square$columns * square$rows, 8)
-  for (page in list(c(7, 5), c(4, 3), c(2, 6))) {
-    for (n in c(1, 2, 7, 8, 30)) {
-      grid <- arrange_stills(n, 1.5, page)
-      expect_gte(grid$columns * grid$rows, n)
-      expect_true(grid$columns * grid$cell[1] <= page[1] + 1e-9)
-      expect_true(grid$rows * grid$cell[2] <= page[2] + 1e-9)
-    }
-  }
-})
-
-test_that("a filmstrip is drawn on any device, in as many rows as make it large", {
-  skip_unless_all()
+test_that("a filmstrip has a panel for each frame", {
   skip_if_not_installed("png")
-  played <- short_rollout()
-  picture <- drawn(ggplot2::autoplot(played, type = "filmstrip", n = 30))
-  expect_length(picture$layers, 2)
+  picture <- drawn(ggplot2::autoplot(short_rollout(), type = "filmstrip", n = 5))
+  panels <- ggplot2::ggplot_build(picture)$layout$layout
+  expect_identical(panels$COL, c(1L, 2L, 1L, 2L, 1L))
+  square <- lapply(1:5, function(i) array(i, c(9, 9, 3)))
+  four <- drawn(filmstrip(list(frames = square, steps = 0:4)))
+  expect_identical(ggplot2::ggplot_build(four)$layout$layout$COL, c(1L, 2L, 3L, 4L, 1L))
+  expect_match(as.character(panels$step), "^step [0-9]+$")
   file <- withr::local_tempfile(fileext = ".png")
   grDevices::png(file, 300, 200)
-  plot(played, type = "filmstrip", n = 4)
+  print(picture)
   grDevices::dev.off()
   pixels <- png::readPNG(file)
   # The poles.

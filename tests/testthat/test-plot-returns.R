@@ -67,8 +67,8 @@ test_that("equal returns, or a single one, have a bar with room beside it", {
 
 test_that("a wrong type, or an argument of another type, is refused by name", {
   played <- rollout_of(1:3)
-  expect_error(plot(played, type = "landscape"),
-               "one of \"returns\", \"trajectory\", \"filmstrip\", not \"landscape\"",
+  expect_error(plot(played, type = "tree"),
+               "one of \"returns\", \"trajectory\", \"filmstrip\", not \"tree\"",
                class = "gym_error_argument")
   expect_error(plot(played, col = "red"), "no argument for `col`", class = "gym_error_argument")
 })
