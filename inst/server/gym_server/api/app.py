@@ -48,6 +48,7 @@ class Config:
         is_private: whether its clients may name files as arguments of environments, and have
             monitors write below the system's temporary directory.
         watch_prefix: what the keys of watch pages begin with.
+        ends_unused: whether to stop when nobody has used the server for ``limits.idle_minutes``.
     """
 
     monitor_dir: Path | None = None
@@ -58,6 +59,7 @@ class Config:
     access: Access = field(default_factory=Access)
     is_private: bool = True
     watch_prefix: str = ""
+    ends_unused: bool = False
 
 
 class GymApp(Flask):
@@ -89,7 +91,12 @@ class GymApp(Flask):
             watch_keys if config.access.token is not None else None,
         )
         self.register_error_handler(Exception, lambda error: _for_flask(failure(error)))
-        self._watchdog = Watchdog(self._instances, self._rollouts, config.limits)
+        self._watchdog = Watchdog(
+            self._instances,
+            self._rollouts,
+            config.limits,
+            config.stop if config.ends_unused else lambda: None,
+        )
 
     def admit(self, environ: dict) -> Admission | Response:
         """Say how to answer a request before its body is read, or refuse it.

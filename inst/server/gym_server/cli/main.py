@@ -23,6 +23,8 @@ from gym_server.cli.options import parser
 from gym_server.cli.stuck import end_when_stuck
 from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
 from gym_server.cli.users import BadUsersError, make_front
+from gym_server.front.handed_over import VARIABLE as FRONT_VARIABLE
+from gym_server.front.handed_over import HandedOver
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
 from gym_server.processes import start
@@ -70,7 +72,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     stop = _Stop()
     try:
         monitor_dir = _prepare_monitor_dir(options.monitor_dir)
-        listener = bind(options.host, options.port)
+        front = os.environ.pop(FRONT_VARIABLE, None)
+        if front is None:
+            listener = bind(options.host, options.port)
+        else:
+            listener = HandedOver(int(front), stop)
     except OSError as error:
         return _fail(_why_not(error, options))
     app = create_app(
@@ -88,6 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             access=Access(token, options.host, options.allow_host),
             is_private=not is_open and os.environ.pop(SHARED_VARIABLE, None) is None,
             watch_prefix=os.environ.pop(PREFIX_VARIABLE, ""),
+            ends_unused=front is not None,
         )
     )
     server = Server(app, listener, Config.max_body_bytes)

@@ -49,7 +49,7 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
         raise BadUsersError(
             f"the directory {error.filename} cannot be used: {error.strerror}"
         ) from None
-    return Front(listener, users, starts, options.idle_minutes)
+    return Front(listener, users, starts)
 
 
 def _wishes(options: argparse.Namespace) -> Wishes:

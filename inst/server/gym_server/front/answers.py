@@ -35,12 +35,12 @@ def malformed(reason: str) -> bytes:
 
 
 def too_many_connections(most: int) -> bytes:
-    """Refuse one more connection of a user, or of watch pages."""
+    """Refuse one more connection to a server that takes none."""
     return _refusal(
         429,
         "too_many_connections",
-        f"Each user may have {most} connections, and as many of watch pages",
-        "close some; each R session has one or two, each watch page up to three",
+        f"Your server is busy, and {most} connections already wait for it",
+        "wait until its calls have ended, or close some connections",
     )
 
 

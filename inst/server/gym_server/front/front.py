@@ -1,4 +1,4 @@
-"""The front: one loop that accepts connections, finds their users, and passes bytes."""
+"""The front: one loop that accepts connections, finds their users, and hands them over."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from selectors import EVENT_READ, DefaultSelector
 from gym_server.front import answers
 from gym_server.front.request_head import LARGEST_BYTES, BadHeadError, RequestHead, read_head
 from gym_server.front.starts import ShareError, Starts
-from gym_server.front.user_server import MOST_CONNECTIONS, Client, UserServer
+from gym_server.front.user_server import MOST_WAITING, Client, UserServer
 from gym_server.front.users_file import User, UsersFile
 
 log = logging.getLogger(__name__)
@@ -34,7 +34,7 @@ class _Newcomer:
 
     def __init__(self, sock: socket.socket) -> None:
         self.socket = sock
-        self.data = b""
+        self.seen = 0
         self.is_refused = False
         self.due = time.monotonic() + _SHOW_SECONDS
 
@@ -46,22 +46,18 @@ class Front:
         port: the port that it listens on.
     """
 
-    def __init__(
-        self, listener: socket.socket, users: UsersFile, starts: Starts, idle_minutes: float
-    ) -> None:
+    def __init__(self, listener: socket.socket, users: UsersFile, starts: Starts) -> None:
         """Prepare to serve; ``run()`` starts.
 
         Args:
             listener: a listening socket.
             users: the users.
             starts: decides how their servers are started.
-            idle_minutes: how long a server may be unused before it ends; 0 for no limit.
         """
         self._listener = listener
         self.port: int = listener.getsockname()[1]
         self._users = users
         self._starts = starts
-        self._idle_seconds = 60 * idle_minutes
         self._selector = DefaultSelector()
         # The oldest is first.
         self._newcomers: dict[_Newcomer, None] = {}
@@ -117,14 +113,12 @@ class Front:
         for server in list(self._servers.values()):
             if server.has_ended():
                 self._replace(server)
-            elif self._idle_seconds and server.is_unused(self._idle_seconds):
-                server.end()
 
     def _replace(self, server: UserServer) -> None:
         """Forget a server that has ended; start another if somebody waits for it."""
         del self._servers[server.user.name]
         for client in server.clean_up():
-            if server.is_ending and not self._is_stopping:
+            if server.has_started and not self._is_stopping:
                 self._enter(client)
             else:
                 self._refuse(client.socket, answers.unavailable())
@@ -173,28 +167,33 @@ class Front:
         # Another connection's event may just have closed this one.
         if newcomer not in self._newcomers:
             return
+        # The user's server reads the request, too.
+        flags = 0 if newcomer.is_refused else socket.MSG_PEEK
         try:
-            data = newcomer.socket.recv(2 * LARGEST_BYTES)
+            data = newcomer.socket.recv(2 * LARGEST_BYTES, flags)
         except BlockingIOError:
             return
         except OSError:
             data = b""
-        if not data:
+        if len(data) <= newcomer.seen:
             self._drop(newcomer)
         elif not newcomer.is_refused:
-            newcomer.data += data
-            self._read_head_of(newcomer)
+            newcomer.seen = len(data)
+            self._read_head_of(newcomer, data)
 
-    def _read_head_of(self, newcomer: _Newcomer) -> None:
+    def _read_head_of(self, newcomer: _Newcomer, data: bytes) -> None:
         try:
-            head = read_head(newcomer.data)
+            head = read_head(data)
         except BadHeadError as error:
             self._let_go(newcomer)
             self._refuse(newcomer.socket, answers.malformed(str(error)))
             return
+        # What was seen is no news.
+        least = newcomer.seen + 1 if head is None else 1
+        newcomer.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, least)
         if head is not None:
             self._let_go(newcomer)
-            self._enter(Client(newcomer.socket, newcomer.data, head))
+            self._enter(Client(newcomer.socket, head))
 
     def _refuse(self, sock: socket.socket, answer: bytes) -> None:
         """Send the only answer of a connection, and read until its client leaves.
@@ -205,6 +204,7 @@ class Front:
         newcomer.is_refused = True
         self._welcome(newcomer)
         try:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, 1)
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _ANSWER_BYTES)
             sock.send(answer)
             sock.shutdown(socket.SHUT_WR)
@@ -214,19 +214,18 @@ class Front:
     # Users -------------------------------------------------------------------------------------
 
     def _enter(self, client: Client) -> None:
-        """Pass a connection on to the server of its token or key; refuse it if there is none."""
+        """Hand a connection over to the server of its token or key; refuse it if there is none."""
         head = client.head
         user = None if head.token is None else self._users.find(head.token)
-        client.watches = user is None
         try:
             server = self._watched(head.key) if user is None else self._server_of(user, head)
+            if server is not None and len(server.waiting) < MOST_WAITING:
+                server.add(client)
+                return
         except (OSError, ShareError) as error:
             log.warning("A user's server cannot be started: %s", error)
             server = None
-        if server is not None and server.takes(client):
-            server.add(client)
-        else:
-            self._refuse(client.socket, self._why_not(client, user, server))
+        self._refuse(client.socket, self._why_not(head, user, server))
 
     def _server_of(self, user: User, head: RequestHead) -> UserServer | None:
         """Return the running server of a user; start it if there is none."""
@@ -245,10 +244,9 @@ class Front:
                 return server
         return None
 
-    def _why_not(self, client: Client, user: User | None, server: UserServer | None) -> bytes:
-        head = client.head
+    def _why_not(self, head: RequestHead, user: User | None, server: UserServer | None) -> bytes:
         if server is not None:
-            return answers.too_many_connections(MOST_CONNECTIONS)
+            return answers.too_many_connections(MOST_WAITING)
         if user is not None:
             return answers.unavailable()
         page_file = answers.page_file(head.path) if head.method == "GET" else None

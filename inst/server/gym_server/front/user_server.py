@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 import secrets
 import socket
 import subprocess
 import time
-from dataclasses import dataclass
+from collections import deque
 from selectors import EVENT_READ, BaseSelector
-from typing import Any
+from typing import Any, NamedTuple
 
 from gym_server.front import control_groups
+from gym_server.front.handed_over import VARIABLE
 from gym_server.front.python import command, environment
-from gym_server.front.relay import Relay
 from gym_server.front.request_head import RequestHead
 from gym_server.front.starts import Start
 from gym_server.front.users_file import User
 
 log = logging.getLogger(__name__)
 
-_ADDRESS = b"Server starting at: http://127.0.0.1:"
-
-# The connections of a user, and as many of the watch pages of that user.
-MOST_CONNECTIONS = 64
+# The connections of a user that may wait until the server takes them.
+MOST_WAITING = 64
 
 # How long a server may take to start, and to end when it was asked to, in seconds. It gives
 # requests in progress ten seconds.
@@ -33,21 +30,16 @@ _START_SECONDS = 120.0
 _END_SECONDS = 15.0
 
 
-@dataclass(eq=False)
-class Client:
+class Client(NamedTuple):
     """A connection whose user, or watch page, is known.
 
     Attributes:
         socket: the socket.
-        request: what it has sent.
-        head: what was read of it.
-        watches: whether it has a watch page's key, and not the token.
+        head: that of its first request, which nobody has taken from the socket yet.
     """
 
     socket: socket.socket
-    request: bytes
     head: RequestHead
-    watches: bool = False
 
 
 class UserServer:
@@ -56,16 +48,16 @@ class UserServer:
     Attributes:
         user: its user.
         route: what the keys of its watch pages begin with.
-        clients: its connections; those with None wait until it has started, or until it has ended
-            and another can be started.
-        is_ending: whether it takes no more connections.
+        waiting: the connections that it has not taken yet.
+        has_started: whether it has taken any.
+        is_ending: whether it takes no more.
     """
 
     def __init__(self, selector: BaseSelector, user: User, token: bytes, start: Start) -> None:
         """Start it.
 
         Args:
-            selector: as for ``Relay``.
+            selector: calls the data that it has for a socket.
             user: the user.
             token: the user's token, which every request must have.
             start: how to start it.
@@ -76,16 +68,17 @@ class UserServer:
         self._selector = selector
         self.user = user
         self.route = secrets.token_urlsafe(9)
-        self.clients: dict[Client, Relay | None] = {}
+        self.waiting: deque[Client] = deque()
+        self.has_started = False
         self.is_ending = False
         self._group = start.group
-        self._port: int | None = None
-        self._said = b""
-        self._used_at = time.monotonic()
-        self._kill_at = self._used_at + _START_SECONDS
+        self._kill_at = time.monotonic() + _START_SECONDS
+        # It ends when this closes, so also when the front is killed.
+        self._socket, its_socket = socket.socketpair()
         variables = environment() | {
             "GYM_SERVER_TOKEN": token.decode("ascii"),
             "GYM_SERVER_WATCH_PREFIX": f"{self.route}.",
+            VARIABLE: str(its_socket.fileno()),
         }
         account: dict[str, Any] = {}
         if start.uid is None:
@@ -94,78 +87,47 @@ class UserServer:
         else:
             variables["HOME"] = str(start.folder)
             account = {"user": start.uid, "group": start.uid, "extra_groups": []}
-        # It ends when its standard input closes, so also when the front is killed.
-        self._process = subprocess.Popen(
-            command("--stop-on-stdin-eof", "--port", "0", *start.arguments),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            cwd=start.folder,
-            env=variables,
-            start_new_session=True,
-            **account,
-        )
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._input, self._output = self._process.stdin, self._process.stdout
+        with its_socket:
+            self._process = subprocess.Popen(
+                command(*start.arguments),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=[its_socket.fileno()],
+                cwd=start.folder,
+                env=variables,
+                start_new_session=True,
+                **account,
+            )
         if start.group is not None:
             control_groups.add(start.group, self._process.pid)
-        selector.register(self._output, EVENT_READ, self._listen)
+        self._socket.setblocking(False)
+        selector.register(self._socket, EVENT_READ, self._note_taken)
         log.info("Started the server of %s (process %d)", user.name, self._process.pid)
 
-    def takes(self, client: Client) -> bool:
-        """Return whether there is room for another connection of its kind."""
-        same = [one for one in self.clients if one.watches == client.watches]
-        return len(same) < MOST_CONNECTIONS
-
     def add(self, client: Client) -> None:
-        """Pass a connection on, or let it wait."""
-        self.clients[client] = None
-        if self._port is not None and not self.is_ending:
-            self._connect(client, self._port)
+        """Hand a connection over, or let it wait until another server can be started.
 
-    def _connect(self, client: Client, port: int) -> None:
-        def ended() -> None:
-            del self.clients[client]
-            self._used_at = time.monotonic()
+        Raises:
+            OSError: the system does not hand over so many at a time.
+        """
+        if not self.is_ending:
+            with contextlib.suppress(ConnectionError):
+                socket.send_fds(self._socket, [b"x"], [client.socket.fileno()])
+        self.waiting.append(client)
 
-        def refused() -> None:
-            # It is about to end.
-            self.clients[client] = None
-            self.end()
-
+    def _note_taken(self, events: int) -> None:
+        """Close the front's copies of the connections that the server has now."""
         try:
-            server = socket.socket()
-        except OSError as error:
-            log.warning("No more connections: %s", error.strerror)
-            client.socket.close()
-            ended()
-            return
-        server.setblocking(False)
-        server.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        server.connect_ex(("127.0.0.1", port))
-        self.clients[client] = Relay(
-            self._selector, client.socket, server, client.request, ended, refused
-        )
-
-    def _listen(self, events: int) -> None:
-        """Read the address that the server prints when it has started."""
-        said = os.read(self._output.fileno(), 1024)
-        self._said += said
-        line, end, _ = self._said.partition(b"\n")
-        if end or not said:
-            self._selector.unregister(self._output)
-        if end and line.startswith(_ADDRESS):
-            self._port = int(line.removeprefix(_ADDRESS))
-            for client in list(self.clients):
-                self._connect(client, self._port)
-
-    def is_unused(self, seconds: float) -> bool:
-        """Return whether nobody has used it for so long, and no request is in progress."""
-        relays = [relay for relay in self.clients.values() if relay is not None]
-        if len(relays) < len(self.clients) or any(relay.is_busy for relay in relays):
-            return False
-        return time.monotonic() > seconds + max(
-            (relay.moved_at for relay in relays), default=self._used_at
-        )
+            taken = len(self._socket.recv(MOST_WAITING))
+        except OSError:
+            taken = 0
+        for _ in range(taken):
+            self.waiting.popleft().socket.close()
+        self.has_started = self.has_started or taken > 0
+        if not taken:
+            self.end()
+            self._selector.unregister(self._socket)
+            self._socket.close()
 
     def end(self) -> None:
         """Ask it to end after the requests in progress."""
@@ -173,26 +135,20 @@ class UserServer:
             self.is_ending = True
             self._kill_at = time.monotonic() + _END_SECONDS
             with contextlib.suppress(OSError):
-                self._input.close()
+                self._socket.shutdown(socket.SHUT_WR)
 
     def has_ended(self) -> bool:
         """Return whether its process has ended; kill one that takes too long to start or to end."""
         is_late = time.monotonic() > self._kill_at
-        if is_late and (self._port is None or self.is_ending):
+        if is_late and (self.is_ending or not self.has_started):
             self._process.kill()
         return self._process.poll() is not None
 
     def clean_up(self) -> list[Client]:
-        """Close what belongs to it after its end; return the connections that still wait."""
-        with contextlib.suppress(KeyError):
-            self._selector.unregister(self._output)
-        for pipe in (self._input, self._output):
-            with contextlib.suppress(OSError):
-                pipe.close()
-        for relay in list(self.clients.values()):
-            if relay is not None:
-                relay.close()
+        """Close what belongs to it after its end; return the connections that it did not take."""
+        while self._socket.fileno() >= 0:
+            self._note_taken(EVENT_READ)
         if self._group is not None:
             control_groups.remove(self._group)
         log.info("The server of %s has ended (%d)", self.user.name, self._process.returncode)
-        return list(self.clients)
+        return list(self.waiting)

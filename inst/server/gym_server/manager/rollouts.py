@@ -97,6 +97,11 @@ class Rollouts:
         self._last_played: tuple[str, float] | None = None
         self._stopping = False
 
+    @property
+    def is_at_work(self) -> bool:
+        """Whether any process plays, or has played just now."""
+        return bool(self._players)
+
     def describe(self, task: Task) -> dict:
         """Return the description of an environment; see ``RolloutEnv.describe()``.
 

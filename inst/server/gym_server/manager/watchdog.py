@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 
 from gym_server import memory
 from gym_server.manager.instance_manager import InstanceManager
@@ -34,6 +35,7 @@ class Watchdog:
         instances: InstanceManager,
         rollouts: Rollouts,
         limits: Limits,
+        end_unused: Callable[[], None],
     ) -> None:
         """Start to watch.
 
@@ -41,11 +43,14 @@ class Watchdog:
             instances: the instances to watch.
             rollouts: the rollouts to watch.
             limits: the limits.
+            end_unused: is called when there has been neither an instance nor a rollout for as long
+                as an instance may be unused.
         """
         self._instances = instances
         self._rollouts = rollouts
         self._limits = limits
-        self._gave_back = time.monotonic()
+        self._end_unused = end_unused
+        self._used = self._gave_back = time.monotonic()
         self._stopped = threading.Event()
         thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
         thread.start()
@@ -69,6 +74,10 @@ class Watchdog:
         self._rollouts.kill_unwanted()
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
+            if self._instances.env_ids() or self._rollouts.is_at_work:
+                self._used = time.monotonic()
+            elif time.monotonic() > self._used + 60 * self._limits.idle_minutes:
+                self._end_unused()
         if time.monotonic() > self._gave_back + _GIVE_BACK_SECONDS:
             garbage, self._instances.left_garbage = self._instances.left_garbage, False
             memory.give_back(garbage)

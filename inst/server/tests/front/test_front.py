@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
@@ -158,6 +159,21 @@ def test_what_is_no_request_is_refused(front, sent, status):
         assert closes(connection)
 
 
+def test_a_head_may_arrive_in_pieces(front):
+    whole = asked(ANNA)
+    with front.socket() as connection:
+        for piece in (whole[:1], whole[1:30], whole[30:-1]):
+            connection.sendall(piece)
+            # The front sees each of them by itself.
+            assert front.ask(None, "GET", "/v1/envs/")[0] == 401
+        assert answered(connection, whole[-1:])[0] == 200
+    # Who leaves within a head leaves nothing.
+    with front.socket() as connection:
+        connection.sendall(whole[:30])
+        connection.shutdown(socket.SHUT_WR)
+        assert closes(connection)
+
+
 def test_no_log_has_a_token_or_a_key(front):
     url = front.make("ben")
     key = front.ask(BEN, "POST", f"{url}/watch/key/", {})[1]["key"]
@@ -187,19 +203,32 @@ def test_a_users_server_that_is_killed_takes_only_its_own(front):
     front.ask(ANNA, "POST", f"{urls['anna']}/close/", {})
 
 
-def test_one_user_has_64_connections_and_takes_those_of_no_other(front):
+def test_a_server_that_hangs_takes_no_connection_of_another_and_later_those_that_wait(front):
+    pid = front.pid_of("anna")
     with contextlib.ExitStack() as stack:
-
-        def connect(token):
-            connection = stack.enter_context(front.socket())
-            return answered(connection, asked(token))
-
-        statuses = [connect(ANNA)[0] for _ in range(64)]
-        assert set(statuses) == {200}
-        status, headers, body, _ = connect(ANNA)
+        os.kill(pid, signal.SIGSTOP)
+        stack.callback(os.kill, pid, signal.SIGCONT)
+        waiting = [stack.enter_context(front.socket()) for _ in range(64)]
+        for connection in waiting:
+            connection.sendall(asked(ANNA))
+        status, headers, body, _ = answered(stack.enter_context(front.socket()), asked(ANNA))
         assert (status, headers["connection"]) == (429, "close")
         assert json.loads(body)["code"] == "too_many_connections"
-        assert connect(BEN)[0] == 200
+        assert front.ask(BEN, "GET", "/v1/envs/")[0] == 200
+        os.kill(pid, signal.SIGCONT)
+        assert {read_answer(connection)[0] for connection in waiting} == {200}
+
+
+def test_a_connection_that_an_ending_server_does_not_take_gets_the_next_one(front):
+    pid = front.pid_of("ben")
+    with front.socket() as waiting, contextlib.closing(front.connect()) as known:
+        front.ask(BEN, "GET", "/v1/envs/", connection=known)
+        os.kill(pid, signal.SIGSTOP)
+        waiting.sendall(asked(BEN, "/v1/health/"))
+        # The front has handed the other one over when this is answered.
+        assert front.ask(ANNA, "GET", "/v1/envs/")[0] == 200
+        os.kill(pid, signal.SIGKILL)
+        assert json.loads(read_answer(waiting)[2])["pid"] != pid
 
 
 def test_the_file_is_read_again_and_who_is_gone_loses_the_server(front, eventually):
