@@ -41,11 +41,13 @@ is_running <- function(base) {
 #' @param timeout The time for the start, in seconds. The default is 60.
 #' @param token Should the server require its own token? `TRUE` or `FALSE`. Only this session knows
 #'   it, so other accounts of the machine cannot use the server. The returned client carries the
-#'   token, and so does each client that [create_GymClient()] makes for this address in this session.
+#'   token, and so does each client that [create_GymClient()] makes for this address in this
+#'   session.
 #'   Other processes, such as another R session or clients in other languages, need `FALSE` or a
-#'   token that they know. The default is `TRUE` without `port`, and `FALSE` with one, because scripts name that address. Any account of
-#'   the machine can then use the server, as a message of class `gym_message_open_server` says.
-#'   `token_file`, `no_auth = TRUE` and the environment variable `GYM_SERVER_TOKEN` take precedence.
+#'   token that they know. The default is `TRUE` without `port`, and `FALSE` with one, because
+#'   scripts name that address. Any account of the machine can then use the server, as a message of
+#'   class `gym_message_open_server` says. `token_file`, `no_auth = TRUE` and the environment
+#'   variable `GYM_SERVER_TOKEN` take precedence.
 #' @param users Path of a file with a name and a token on each line, a string, or `NULL`. With it
 #'   each user gets a server of their own, as described in `vignette("server", package = "gym")`:
 #'   nobody can see, step or close what another has. The file must be readable by you alone, and is
