@@ -10,7 +10,7 @@ from gym_server.api.access import is_loopback
 from gym_server.cli.token_file import VARIABLE
 from gym_server.front.folders import Folders
 from gym_server.front.front import Front
-from gym_server.front.starts import ShareError, Starts, Wishes
+from gym_server.front.starts import ShareError, Starts
 from gym_server.front.users_file import UsersFile, UsersFileError
 from gym_server.manager.limits import Limits
 
@@ -42,7 +42,14 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
                 "account here; start it as root, with a Python that all accounts can run, or leave "
                 "it out"
             )
-        starts = Starts(folders, _wishes(options), len(users.users))
+        starts = Starts(
+            folders,
+            len(users.users),
+            _arguments(options),
+            options.max_memory_mb,
+            None if options.max_processes == Limits.max_processes else options.max_processes,
+            options.max_rollout_processes,
+        )
     except (UsersFileError, ShareError) as error:
         raise BadUsersError(str(error)) from None
     except OSError as error:
@@ -52,12 +59,13 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
     return Front(listener, users, starts)
 
 
-def _wishes(options: argparse.Namespace) -> Wishes:
+def _arguments(options: argparse.Namespace) -> list[str]:
+    """Return the options of all users' servers."""
     hosts = list(options.allow_host)
     if not is_loopback(options.host):
         hosts.append(socket.getfqdn())
-    processes, rollouts = options.max_processes, options.max_rollout_processes
-    arguments = [
+    rollouts = options.max_rollout_processes
+    return [
         *(f"--allow-host={name}" for name in hosts),
         *(f"--allow-module={name}" for name in options.allow_module),
         *(f"--max-rollout-processes={number}" for number in (rollouts,) if number is not None),
@@ -66,5 +74,3 @@ def _wishes(options: argparse.Namespace) -> Wishes:
         f"--log-level={options.log_level}",
         "--monitor-dir=.",
     ]
-    own_processes = None if processes == Limits.max_processes else processes
-    return Wishes(arguments, options.max_memory_mb, own_processes, rollouts)

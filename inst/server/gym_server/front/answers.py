@@ -17,21 +17,20 @@ _PAGE_FILE = re.compile(r"/v1/envs/[^/]+/watch/([a-z]+\.(css|js))/?")
 _TYPES = {"css": "text/css", "js": "text/javascript"}
 
 
-def unauthorized(has_key: bool, has_header: bool) -> bytes:
+def unauthorized() -> bytes:
     """Refuse a request that shows neither the token of a user nor the key of a running server."""
-    if has_key and not has_header:
-        message = "The key in this link has expired, or its server has ended"
-        return _refusal(401, "unauthorized", message, "R's env_watch() makes a new link")
-    message = (
-        "The token is not this server's" if has_header else "This server asks everybody for a token"
+    return _refusal(
+        401,
+        "unauthorized",
+        "The token is not this server's, or the link of a watch page has expired",
+        "send the header 'Authorization: Bearer' with your token; R's env_watch() makes a new link",
     )
-    hint = "send the header 'Authorization: Bearer' with your token"
-    return _refusal(401, "unauthorized", message, hint)
 
 
 def malformed(reason: str) -> bytes:
     """Refuse bytes that are not the head of a request."""
-    return _refusal(400, "malformed_json", f"The request cannot be read: {reason}")
+    message = f"The request cannot be read: {reason}"
+    return _refusal(400, "malformed_json", message, "send requests of HTTP/1.1")
 
 
 def too_many_connections(most: int) -> bytes:
@@ -63,11 +62,9 @@ def page_file(path: str) -> bytes | None:
     return _response(200, f"{_TYPES[asked[2]]}; charset=utf-8", body)
 
 
-def _refusal(status: int, code: str, message: str, hint: str = "") -> bytes:
+def _refusal(status: int, code: str, message: str, hint: str) -> bytes:
     """Return an error as a user's server would send it."""
-    body = {"message": message, "code": code, "documentation_url": _DOCUMENTATION}
-    if hint:
-        body["hint"] = hint
+    body = {"message": message, "code": code, "hint": hint, "documentation_url": _DOCUMENTATION}
     extra = ['WWW-Authenticate: Bearer realm="gym_server"'] if status == 401 else []
     return _response(status, "application/json", json.dumps(body).encode(), *extra)
 

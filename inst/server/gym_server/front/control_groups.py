@@ -6,7 +6,8 @@ import contextlib
 import os
 from pathlib import Path
 
-_CONTROLLERS = ("memory", "pids", "cpu")
+_MOUNT = Path("/sys/fs/cgroup")
+_CONTROLLERS = "+memory +pids +cpu"
 
 # The threads and processes of one user. A server has a thread for each connection, and each of its
 # processes some for linear algebra.
@@ -26,9 +27,6 @@ class ControlGroups:
             OSError: the system has no such groups, or this process may not make any.
         """
         own = _own_group()
-        available = (own / "cgroup.controllers").read_text().split()
-        if not set(_CONTROLLERS) <= set(available):
-            raise FileNotFoundError(0, f"{own} has not all of {', '.join(_CONTROLLERS)}")
         # A group with groups below it may have no processes of its own, so this one moves down.
         self._root = own / f"gym-{os.getpid()}"
         self._own, self._front = own, self._root / "front"
@@ -36,8 +34,7 @@ class ControlGroups:
             self._front.mkdir(parents=True)
             add(self._front, os.getpid())
             for parent in (own, self._root):
-                enabled = " ".join(f"+{name}" for name in _CONTROLLERS)
-                (parent / "cgroup.subtree_control").write_text(enabled)
+                (parent / "cgroup.subtree_control").write_text(_CONTROLLERS)
             (self._front / "cpu.weight").write_text(str(_FRONT_WEIGHT))
         except OSError:
             self.close()
@@ -81,10 +78,7 @@ def remove(group: Path) -> None:
 
 def _own_group() -> Path:
     """Return the folder of this process's group."""
-    for line in Path("/proc/self/mountinfo").read_text().splitlines():
-        fields = line.split()
-        if fields[fields.index("-") + 1] == "cgroup2":
-            for group in Path("/proc/self/cgroup").read_text().splitlines():
-                if group.startswith("0::"):
-                    return Path(fields[4]) / group.removeprefix("0::").lstrip("/")
+    for group in Path("/proc/self/cgroup").read_text().splitlines():
+        if group.startswith("0::") and (_MOUNT / "cgroup.controllers").exists():
+            return _MOUNT / group.removeprefix("0::").lstrip("/")
     raise FileNotFoundError(0, "no cgroup2 is mounted")

@@ -32,21 +32,11 @@ class Folders:
         """
         self.separate = os.geteuid() == 0 and _can_serve(_UIDS[-1])
         self._is_temporary = base is None
-        self._made = None if base is None else self._prepare(base)
-
-    def _prepare(self, base: Path) -> Path:
-        base.mkdir(parents=True, exist_ok=True)
+        self._base = Path(tempfile.mkdtemp(prefix="gym-users-")) if base is None else base.resolve()
+        self._base.mkdir(parents=True, exist_ok=True)
         if self.separate:
             # Each user reaches their own folder, and cannot list the others.
-            base.chmod(0o711)
-        return base.resolve()
-
-    @property
-    def _base(self) -> Path:
-        """The folder of all; a temporary one is made when it is needed."""
-        if self._made is None:
-            self._made = self._prepare(Path(tempfile.mkdtemp(prefix="gym-users-")))
-        return self._made
+            self._base.chmod(0o711)
 
     def of(self, name: str) -> tuple[Path, int | None]:
         """Return a user's folder, and the uid of the server that works in it, or None.
@@ -66,7 +56,7 @@ class Folders:
 
     def close(self) -> None:
         """Remove temporary folders that hold nothing."""
-        if self._is_temporary and self._made is not None:
+        if self._is_temporary:
             for folder in (*self._base.iterdir(), self._base):
                 with contextlib.suppress(OSError):
                     folder.rmdir()

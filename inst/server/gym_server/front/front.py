@@ -25,6 +25,9 @@ _MOST_NEWCOMERS = 1000
 # How often servers, files and times are looked at, in seconds.
 _TICK_SECONDS = 1.0
 
+# How long to wait for others to close files when no more may be opened, in seconds.
+_FULL_SECONDS = 0.2
+
 # Room for the largest answer of the front in a socket's buffer.
 _ANSWER_BYTES = 2**18
 
@@ -79,7 +82,7 @@ class Front:
         signal.set_wakeup_fd(self._waker.fileno(), warn_on_full_buffer=False)
         self._listener.setblocking(False)
         self._selector.register(self._wake, EVENT_READ, self._note_wake)
-        self._listen()
+        self._selector.register(self._listener, EVENT_READ, self._accept)
         while self._servers or not self._is_stopping:
             for key, events in self._selector.select(_TICK_SECONDS):
                 try:
@@ -99,11 +102,10 @@ class Front:
     def _tick(self) -> None:
         if self._is_stopping:
             if self._listener.fileno() >= 0:
-                self._ignore_listener()
+                self._selector.unregister(self._listener)
                 self._listener.close()
             for server in self._servers.values():
                 server.end()
-        self._listen()
         while self._newcomers and next(iter(self._newcomers)).due < time.monotonic():
             self._drop(next(iter(self._newcomers)))
         if self._users.read_again():
@@ -125,22 +127,14 @@ class Front:
 
     # Newcomers ---------------------------------------------------------------------------------
 
-    def _listen(self) -> None:
-        if self._listener.fileno() >= 0 and self._listener not in self._selector.get_map():
-            self._selector.register(self._listener, EVENT_READ, self._accept)
-
-    def _ignore_listener(self) -> None:
-        with contextlib.suppress(KeyError):
-            self._selector.unregister(self._listener)
-
     def _accept(self, events: int) -> None:
         try:
             client, _ = self._listener.accept()
         except OSError as error:
             if error.errno in (errno.EMFILE, errno.ENFILE):
                 log.warning("No more connections: this process may open no more files")
-                # Until the next tick.
-                self._ignore_listener()
+                # Who has a server already does not wait for this.
+                time.sleep(_FULL_SECONDS)
             return  # Otherwise the client has already left.
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -250,4 +244,4 @@ class Front:
         if user is not None:
             return answers.unavailable()
         page_file = answers.page_file(head.path) if head.method == "GET" else None
-        return page_file or answers.unauthorized(bool(head.key), head.has_authorization)
+        return page_file or answers.unauthorized()

@@ -23,14 +23,12 @@ class RequestHead(NamedTuple):
     Attributes:
         method: such as "GET".
         path: of the URL.
-        has_authorization: whether it has the header Authorization.
         token: that of the header "Authorization: Bearer", or None.
         key: the watch page's key in the URL, or "".
     """
 
     method: str
     path: str
-    has_authorization: bool
     token: bytes | None
     key: str
 
@@ -68,6 +66,4 @@ def read_head(data: bytes) -> RequestHead | None:
     scheme, _, token = given[0].partition(b" ") if len(given) == 1 else (b"", b"", b"")
     key = parse_qs(query).get("key", [""])[0]
     is_bearer = scheme.lower() == b"bearer"
-    return RequestHead(
-        parts[1].decode("ascii"), path, bool(given), token.strip() if is_bearer else None, key
-    )
+    return RequestHead(parts[1].decode("ascii"), path, token.strip() if is_bearer else None, key)

@@ -39,39 +39,38 @@ class Start:
     group: Path | None = None
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What the operator has chosen; None where the front decides.
-
-    Attributes:
-        arguments: further options of all servers.
-        memory_mb: the memory of a user's server with all its processes, in MiB.
-        processes: the processes of a user's environments.
-        rollout_processes: those that play whole episodes, besides these.
-    """
-
-    arguments: Sequence[str] = ()
-    memory_mb: int | None = None
-    processes: int | None = None
-    rollout_processes: int | None = None
-
-
 class Starts:
     """Decides how the servers are started."""
 
-    def __init__(self, folders: Folders, wishes: Wishes, users: int) -> None:
+    def __init__(
+        self,
+        folders: Folders,
+        users: int,
+        arguments: Sequence[str],
+        memory_mb: int | None,
+        processes: int | None,
+        rollout_processes: int | None,
+    ) -> None:
         """Find out what the system offers, and say what it does not.
 
         Args:
             folders: the working directories.
-            wishes: what the operator has chosen.
             users: how many users there are.
+            arguments: options of all servers.
+            memory_mb: the memory of a user's server with all its processes, in MiB; None for an
+                equal part of three quarters of the machine's.
+            processes: the processes of a user's environments; None for one per core.
+            rollout_processes: those that play whole episodes, besides these; None likewise.
 
         Raises:
             ShareError: too little memory is left for each.
         """
         self._folders = folders
-        self._wishes = wishes
+        self._arguments = arguments
+        self._memory_mb = memory_mb
+        self._environment_processes = own = processes or usable_cores()
+        # How many processes a user may have where only each of them is limited.
+        self._processes = 1 + own + min(own, rollout_processes or usable_cores())
         self._groups: ControlGroups | None = None
         reason = None
         try:
@@ -95,21 +94,9 @@ class Starts:
         if self._groups is not None:
             self._groups.close()
 
-    @property
-    def _environment_processes(self) -> int:
-        return usable_cores() if self._wishes.processes is None else self._wishes.processes
-
-    @property
-    def _processes(self) -> int:
-        """How many processes a user may have where only each of them is limited."""
-        of_environments = self._environment_processes
-        wanted = self._wishes.rollout_processes
-        of_rollouts = usable_cores() if wanted is None else wanted
-        return 1 + of_environments + min(of_environments, of_rollouts)
-
     def _share_mb(self, users: int) -> int:
         """Return the memory of a user, in MiB: an equal part of three quarters of the machine's."""
-        share = self._wishes.memory_mb or machine_mb() * 3 // 4 // users
+        share = self._memory_mb or machine_mb() * 3 // 4 // users
         parts = 1 if self._groups is not None else self._processes
         if share // parts < _LEAST_MB:
             raise ShareError(
@@ -141,4 +128,4 @@ class Starts:
                 *("--max-memory-mb", str(share // self._processes)),
                 *("--max-processes", str(self._environment_processes)),
             ]
-        return Start((*self._wishes.arguments, *limits), folder, uid, group)
+        return Start((*self._arguments, *limits), folder, uid, group)

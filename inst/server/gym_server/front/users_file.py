@@ -101,16 +101,20 @@ def read_users(file: Path) -> tuple[User, ...]:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not a text in UTF-8"
         raise UsersFileError(f"the file {file} cannot be read: {reason}") from None
-    lines: dict[User, int] = {}
+    users: list[User] = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
-            user = _read_line(line, f"line {number} of {file}")
-            for other, at in lines.items():
-                _check_pair(user, other, f"lines {at} and {number} of {file}")
-            lines[user] = number
-    if not lines:
+            place = f"line {number} of {file}"
+            user = _read_line(line, place)
+            # Some file systems do not distinguish upper and lower case in the names of folders.
+            if user.name.lower() in {other.name.lower() for other in users}:
+                raise UsersFileError(f"{place} has a name again; give each user one line")
+            if user.digest in {other.digest for other in users}:
+                raise UsersFileError(f"{place} has a token again; give each user another one")
+            users.append(user)
+    if not users:
         raise UsersFileError(f"the file {file} has no user; write a name and a token on each line")
-    return tuple(lines)
+    return tuple(users)
 
 
 def _read_line(line: str, place: str) -> User:
@@ -129,11 +133,3 @@ def _read_line(line: str, place: str) -> User:
             "'openssl rand -hex 16' makes one"
         )
     return User(name, sha256(others[0].encode()).digest())
-
-
-def _check_pair(one: User, other: User, places: str) -> None:
-    # Some file systems do not distinguish upper and lower case in the names of folders.
-    if one.name.lower() == other.name.lower():
-        raise UsersFileError(f"{places} have the same name; give each user one line")
-    if one.digest == other.digest:
-        raise UsersFileError(f"{places} have the same token; give each user another one")

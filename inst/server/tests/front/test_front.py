@@ -90,14 +90,13 @@ def test_a_stream_passes(front):
 
 
 def test_a_wrong_token_and_none_get_one_answer(front):
-    for token, words in (("wrong-0123456789abc", "is not this"), (None, "asks everybody")):
+    for token in ("wrong-0123456789abc", None):
         with front.socket() as connection:
             status, headers, body, _ = answered(connection, asked(token))
             assert (status, headers["connection"]) == (401, "close")
             assert headers["www-authenticate"].startswith("bearer")
-            assert (
-                json.loads(body)["code"] == "unauthorized" and words in json.loads(body)["message"]
-            )
+            assert json.loads(body)["code"] == "unauthorized"
+            assert "is not this server's" in json.loads(body)["message"]
             # The right one comes too late, and a body that is still sent does no harm.
             with contextlib.suppress(ConnectionError):
                 connection.sendall(asked(ANNA) + b"x" * 100_000)
