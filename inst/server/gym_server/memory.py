@@ -112,9 +112,7 @@ def limit(megabytes: int | None) -> None:
         megabytes = machine_mb() * 3 // 4
     # Not RLIMIT_AS: threads and libraries reserve address space that they never use. What the
     # process has by now is mostly reserved, too: NumPy has a stack for each core.
-    lines = Path("/proc/self/status").read_text().splitlines()
-    taken = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:"))
-    size = taken + megabytes * _MB
+    size = _taken() + megabytes * _MB
     most = size + _RESERVE_BYTES
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     if hard != resource.RLIM_INFINITY:
@@ -122,6 +120,17 @@ def limit(megabytes: int | None) -> None:
 
     _limits = size, most
     resource.setrlimit(resource.RLIMIT_DATA, _limits)
+
+
+def _taken() -> int:
+    """Return how many bytes count for the limit."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:"))
+
+
+def is_short() -> bool:
+    """Return whether more than half of what the limit allows is taken."""
+    return _limits is not None and _taken() > _limits[0] // 2
 
 
 def start(thread: threading.Thread) -> None:

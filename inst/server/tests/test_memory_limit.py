@@ -61,6 +61,12 @@ def test_a_step_that_takes_all_memory_is_an_error_and_the_others_go_on(small):
     assert small.post(f"{url}/reset/")[0] == 200
 
 
+def test_what_a_closed_environment_took_is_there_for_the_next(small):
+    for _ in range(3):
+        url = small.create("faulty_envs:Large-v0", kwargs={"megabytes": 150})
+        assert small.post(f"{url}/close/")[0] == 204
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("at", ["constructor", "reset", "step", "render"])
 @pytest.mark.parametrize("what", ["large", "small", "threads"])

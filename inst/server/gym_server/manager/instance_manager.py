@@ -56,8 +56,8 @@ class InstanceManager:
         self._renderer = renderer
         self._lock = threading.Lock()
         self._instances: dict[str, Instance] = {}
-        # Whether an environment was closed since the last garbage collection. The watchdog collects
-        # garbage and resets this.
+        # Whether an environment was closed since the last garbage collection. Who collects garbage,
+        # such as the watchdog, resets this.
         self.left_garbage = False
         # How many processes each instance takes, from the start of its creation until it is closed.
         self._workers: dict[str, int] = {}
@@ -79,6 +79,11 @@ class InstanceManager:
         if config.num_envs is None:
             make_vec.check_single(config)
         instance_id, config = self._take_room(config)
+        if self.left_garbage and memory.is_short():
+            # The new environment may need what closed ones still hold. A library without memory
+            # would end the server.
+            self.left_garbage = False
+            memory.give_back()
         try:
             with calls.call(lambda: f"Making {config}"), contextlib.ExitStack() as undo:
                 instance = make_instance(

@@ -35,8 +35,11 @@ def _(space: Dict, value: object) -> object:
     if not isinstance(value, dict):
         raise NotInSpace(space, value, "an object is needed")
     by_text = {str(key): key for key in space.spaces}
-    for text in by_text.keys() - value.keys():
-        raise NotInSpace(space, value, f"{brief(text)} is missing")
-    for text in value.keys() - by_text.keys():
-        raise NotInSpace(space, value, f"{brief(text)} is not one of its keys")
+    # In order, so that the same value always gets the same words.
+    for text in by_text:
+        if text not in value:
+            raise NotInSpace(space, value, f"{brief(text)} is missing")
+    for text in value:
+        if text not in by_text:
+            raise NotInSpace(space, value, f"{brief(text)} is not one of its keys")
     return {key: decode_part(space.spaces[key], value[text], text) for text, key in by_text.items()}

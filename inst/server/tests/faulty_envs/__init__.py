@@ -14,7 +14,7 @@ from faulty_envs.hanging import (
     HangsWhenClosedElsewhere,
     Meeting,
 )
-from faulty_envs.hoarding import Hoards
+from faulty_envs.hoarding import Hoards, Large
 from faulty_envs.odd_spaces import (
     SPACES,
     CustomSpace,
@@ -58,6 +58,7 @@ for _kind in (
     Insists,
     KeepsItsArrays,
     KillsItself,
+    Large,
     Letters,
     LongDouble,
     LooksTimed,

@@ -1,4 +1,4 @@
-"""An environment that takes all the memory that its process may have."""
+"""Environments that take much memory, or all that their process may have."""
 
 import threading
 
@@ -46,3 +46,11 @@ class Hoards(Counting):
 
     def render(self):
         self.act("render")
+
+
+class Large(Counting):
+    """Keeps some memory."""
+
+    def __init__(self, megabytes):
+        super().__init__()
+        self.kept = bytearray(megabytes * 2**20)

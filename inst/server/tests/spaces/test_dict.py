@@ -27,6 +27,8 @@ def test_an_empty_one_is_also_rs_empty_list():
     ("value", "reason"),
     [
         ({"b": 1}, '"a" is missing'),
+        ({"z": 1, "y": 2, "x": 3}, '"b" is missing'),
+        ({"a": {"x": 1}, "b": 1, "f": 2, "e": 2, "d": 2}, '"f" is not one of its keys'),
         ({"a": {"x": 1}, "b": 1, "c": 2}, '"c" is not one of its keys'),
         ([1, 2], "an object is needed"),
         ([], "an object is needed"),
