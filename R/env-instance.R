@@ -164,6 +164,7 @@ new_instance <- function(client, instance_id, about) {
   instance$sends_tensors <- travels_as_tensors(instance$single_action_space, about$num_envs)
   instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
+  instance$takes_numbers <- takes_numbers(observed)
   instance$done <- FALSE
   # One for each combination of a call's flags, prepared at the first such call.
   instance$resets <- vector("list", 4L)

@@ -227,12 +227,9 @@ server_env <- R6Class(
     step = function(action, which = NULL, infos = TRUE, finals = TRUE) {
       if (private$closed) check_open(self)
       if (missing(action)) check_given(action)
-      call <- rlang::current_env()
-      withCallingHandlers(
-        step_instance(
-          private$instance, action, which, named = TRUE, infos = infos, finals = finals
-        ),
-        gym_error_connection = function(cnd) check_open(self, call)
+      step_instance(
+        private$instance, action, which, named = TRUE, infos = infos, finals = finals,
+        call = environment(), check_ended = check_open(self)
       )
     },
     render = function(which = 1) {

@@ -21,10 +21,23 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
   slot <- 1L + named + 2L * infos
   request <- instance$resets[[slot]]
   if (is.null(request)) {
-    request <- prepare_reset(instance, named, infos)
+    request <- list2env(prepare_reset(instance, named, infos), parent = emptyenv())
     instance$resets[[slot]] <- request
   }
-  result <- perform_request(request, json_members(fields), call)
+  stream <- stream_of(instance)
+  message <- if (!is.null(stream$con) && !stream$busy) {
+    request$message %||% keep_message(request, reset_message(instance, request, stream, named))
+  }
+  content <- json_members(fields)
+  result <- if (is.list(message)) {
+    body <- request$body(content, NULL)
+    ask_stream(stream, message, body, message_head(length(body), 1L, 1L), call)
+  }
+  result <- if (is.list(result)) {
+    result[[1L]]
+  } else {
+    perform_request(request, content, call, key = stream_key(stream, result))
+  }
   instance$done <- FALSE
   if (return_info) result else result$observation
 }
@@ -42,18 +55,47 @@ prepare_reset <- function(instance, named, infos) {
 #' @inheritParams reset_instance
 #' @param finals Whether the server sends the last observations of episodes after which another one
 #'   began.
+#' @param check_ended Raises an error if the environment has ended with its server. It is evaluated
+#'   if there is no answer.
 #' @noRd
 step_instance <- function(instance, action, which = NULL, render = FALSE, named = FALSE,
-                          infos = TRUE, finals = TRUE, call = rlang::caller_env()) {
+                          infos = TRUE, finals = TRUE, call = rlang::caller_env(),
+                          check_ended = NULL) {
   slot <- 1L + named + 2L * infos + 4L * render + 8L * finals
   request <- instance$steps[[slot]]
   if (is.null(request) || !identical(request$which, which)) {
     check_which(which, instance, call)
-    request <- prepare_step(instance, which, render, named, infos, finals)
+    request <- list2env(
+      prepare_step(instance, which, render, named, infos, finals), parent = emptyenv()
+    )
     instance$steps[[slot]] <- request
   }
-  content <- request$write(action) %||% request$check_and_write(action, call)
-  result <- perform_request(request, content, call)
+  # It may come from another step. Take that one first.
+  force(action)
+  stream <- stream_of(instance)
+  message <- if (!is.null(stream$con) && !stream$busy) {
+    request$message %||% keep_message(
+      request, step_message(instance, request, stream, render, named, infos, finals)
+    )
+  }
+  result <- if (is.list(message)) {
+    content <- message$write(action)
+    head <- message$head
+    if (is.null(content)) {
+      content <- request$body(request$check_and_write(action, call), NULL)
+      head <- message_head(length(content), 0L, 1L + instance$sends_tensors)
+    }
+    ask_stream(stream, message, content, head, call)
+  }
+  result <- if (is.list(result)) {
+    result[[1L]]
+  } else {
+    content <- request$write(action) %||% request$check_and_write(action, call)
+    withCallingHandlers(
+      perform_request(request, content, call, key = stream_key(stream, result)),
+      gym_error_connection = function(cnd) check_ended
+    )
+  }
   if (is.null(instance$num_envs)) {
     if (isTRUE(instance$done)) {
       # NA: the episode is over, and the warning has been given.

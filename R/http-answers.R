@@ -33,6 +33,8 @@ parsed_body <- function(response) {
   } else if (is_tensors_type(response$type)) {
     by_column <- response$type == column_tensors_type
     tensors_answer(response$content, read_layout(response$content, by_column))
+  } else if (identical(response$type, message_type)) {
+    list(message = response$content)
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
   } else {

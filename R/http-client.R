@@ -14,7 +14,12 @@ new_client <- function(remote_base, timeout = 60, config = httr::config(), token
 }
 
 #' @export
-print.GymClient <- function(x, ...) print_line(x)
+print.GymClient <- function(x, ...) {
+  print_line(x)
+  why <- why_http(x)
+  cat("  steps go by ", if (is.null(why)) "a stream" else paste0("HTTP: ", why), "\n", sep = "")
+  invisible(x)
+}
 
 #' @export
 format.GymClient <- function(x, ...) paste0("<GymClient: ", x$remote_base, ">")

@@ -15,6 +15,7 @@ client_state <- function(client) {
     connection <- new_connection(keys, fetch_with_token_of(client))
     suspendInterrupts({
       state$connection <- connection
+      state$home <- new.env(parent = emptyenv())
       state$session_config <- getOption("httr_config")
       state$instances <- new.env(parent = emptyenv())
       state$creation_keys <- new_idempotency_keys()
@@ -29,6 +30,7 @@ client_state <- function(client) {
     })
   } else if (!identical(state$session_config, getOption("httr_config"))) {
     suspendInterrupts({
+      state$home <- new.env(parent = emptyenv())
       state$connection$handles <- new.env(parent = emptyenv())
       state$connection$inner <- NULL
       state$line <- NULL
@@ -136,6 +138,8 @@ random_key <- function() {
 
 json_type <- "application/json"
 tensors_type <- "application/x-safetensors"
+# The answer of a stream, for a request that repeats its message.
+message_type <- "application/x-gym-message"
 # With transposed tensors, in R's order. A server that does not know it answers by rows.
 column_tensors_type <- "application/x-safetensors; order=column"
 accepted_tensors <- paste0(column_tensors_type, ", ", tensors_type, ";q=0.9")

@@ -88,6 +88,8 @@ remember_instance <- function(place, client, instance_id = NULL, body = NULL, en
 }
 
 forget_instance <- function(place) {
+  drop_streams(function(stream) stream$place == place)
+  the_session$keys[[paste(place, Sys.getpid())]] <- NULL
   if (exists(place, envir = the_session$instances, inherits = FALSE)) {
     rm(list = place, envir = the_session$instances)
   }
@@ -100,6 +102,7 @@ places_on <- function(base) {
 
 # Forgets all instances of a server that was stopped.
 forget_instances_of <- function(base) {
+  drop_streams(function(stream) stream$client$remote_base == base)
   rm(list = places_on(base), envir = the_session$instances)
 }
 

@@ -143,7 +143,7 @@ new_json_body <- function(fields) {
   of_key <- ending <- NULL
   function(content, key) {
     if (is.null(key)) {
-      return(charToRaw(json_object(fields)))
+      return(charToRaw(paste0("{", sub(",$", "", paste0(content, json_members(fields))), "}")))
     }
     if (!identical(of_key, key$key)) {
       server <- if (!is.null(key$server)) paste0('"server":', to_json(key$server), ",")
@@ -184,9 +184,11 @@ new_tensors_body <- function(fields, n = NULL) {
   parts <- NULL
   function(content, key) {
     integers <- is.integer(content)
-    if (!integers && any(texts <- vapply(content, is.character, NA))) {
+    if (!integers && (is.null(key) || any(vapply(content, is.character, NA)))) {
+      texts <- vapply(content, is.character, NA)
       # These are among the metadata, so the header differs each time.
-      fields <- c(fields, texts = to_json(content[texts]), request = key_json(key))
+      fields <- c(fields, if (any(texts)) c(texts = to_json(content[texts])),
+                  if (!is.null(key)) c(request = key_json(key)))
       return(write_tensors(content[!texts], fields))
     }
     table <- if (integers) of_integers else tensors_table(content)

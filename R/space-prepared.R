@@ -84,6 +84,61 @@ json_writer.gym_space_box <- function(space) {
   }
 }
 
+#' Make the function that checks an action, or a batch of actions, and writes its numbers
+#'
+#' @param space The space of one action.
+#' @param n The number of actions, `NULL` for one action.
+#' @return A function of an action or a batch, which returns a raw vector, or `NULL` for one that
+#'   [check_value()] or [check_batch()] must handle.
+#' @noRd
+array_writer <- function(space, n) {
+  if (!is.null(n)) {
+    write <- tensors_writer(space, n)
+    return(function(values) {
+      tensors <- write(values)
+      if (is.integer(tensors)) int64_bytes(tensors) else tensors$action$bytes
+    })
+  }
+  if (inherits(space, "gym_space_discrete") && space$n <= most_prepared) {
+    return(discrete_writer(space))
+  }
+  limit <- if (inherits(space, "gym_space_box") && length(space$shape) == 1L) {
+    float_limits[space$dtype]
+  } else {
+    NA
+  }
+  if (is.na(limit)) {
+    return(function(value) NULL)
+  }
+  write <- tensor_types[[tensor_dtypes[[space$dtype]]]]$write
+  function(value) {
+    if (length(value) == space$shape && is.double(value) && is.null(attributes(value)) &&
+          isTRUE(max(abs(value)) <= limit)) {
+      write(value)
+    }
+  }
+}
+
+# The bytes of so many actions are prepared.
+most_prepared <- 1024
+
+discrete_writer <- function(space) {
+  values <- as.integer(space$start + seq_len(space$n) - 1L)
+  bytes <- lapply(values, int64_bytes)
+  before <- space$start - 1
+  n <- length(bytes)
+  function(value) {
+    if (length(value) == 1L && (is.numeric(value) || is.logical(value)) && !is.object(value)) {
+      at <- value - before
+      if (!is.na(at) && at == trunc(at) && at >= 1 && at <= n) bytes[[at]]
+    }
+  }
+}
+
+int64_bytes <- function(integers) {
+  writeBin(as.vector(rbind(integers, -(integers < 0L))), raw(), endian = "little")
+}
+
 #' Make the function that checks a batch of actions and puts it into tensors
 #'
 #' @param space The space of one action.

@@ -17,6 +17,7 @@
 # process. This is how a client notices that it has been moved.
 the_session <- new.env(parent = emptyenv())
 the_session$servers <- list()
+the_session$messages <- 0
 the_session$environments <- list()
 the_session$client <- NULL
 the_session$instances <- new.env(parent = emptyenv())

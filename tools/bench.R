@@ -10,6 +10,9 @@
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
 #   [beside] [wire] [memory] [tables] runs parts.
 #
+#   make bench PARTS=stream      another build of this package against this one, see
+#                                tools/bench/stream.R
+#
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
 #                                bench-gradients.csv and bench-gradients.md there.
 #                                Only this part needs torch; see tools/bench/gradients.R, also for
@@ -17,7 +20,7 @@
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
-               "rollouts", "beside", "wire", "gradients", "tables", "results", "goals", "table",
+               "rollouts", "beside", "wire", "stream", "gradients", "tables", "results", "goals", "table",
                "figure", "figure-environments")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
@@ -61,6 +64,7 @@ bench <- function(parts, quick) {
     if ("env_rollouts" %in% parts) compare_rollouts(python, scale$rollout_turns, quick),
     if ("beside" %in% parts) compare_beside(python, scale$rollout_turns, quick),
     if ("wire" %in% parts) compare_steps(python, scale$step_turns, scale$turn_steps),
+    if ("stream" %in% parts) compare_builds(3L * scale$turns),
     if ("gradients" %in% parts) {
       compare_gradients(python, utils::modifyList(scale, gradient_scale))
     },
@@ -71,7 +75,7 @@ bench <- function(parts, quick) {
 }
 
 set_up <- function(python, parts) {
-  if (all(parts %in% c("gradients", "tables"))) {
+  if (all(parts %in% c("gradients", "tables", "stream"))) {
     return(list(python = start_python(python)))
   }
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
@@ -142,7 +146,7 @@ arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
 all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
                "memory", "tables")
-parts <- intersect(c(all_parts, "gradients"), arguments)
+parts <- intersect(c(all_parts, "stream", "gradients"), arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts
 if ("gradients" %in% parts) gradient_scale <- chosen_scale(arguments)

@@ -39,6 +39,8 @@ def serve(client, server_port, when, pattern, left):
         request, from_client = read_message(client, from_client)
         if request is None:
             break
+        # Like proxies that do not know it.
+        request = request.replace(b"Upgrade: websocket\r\n", b"")
         cut = left[0] > 0 and pattern in request.split(b"\r\n")[0]
         if cut:
             left[0] -= 1

@@ -102,6 +102,12 @@ local_cut_client <- function(server, when, pattern, times = 1, frame = parent.fr
   create_GymClient(proxy, timeout = 10, token = token_of(server))
 }
 
+# A client of a server whose steps go by HTTP.
+http_client <- function(client = test_client()) {
+  create_GymClient(client$remote_base, config = httr::add_headers(a = "b"),
+                   token = token_of(client))
+}
+
 # For another address of a server, or another process.
 token_of <- function(client) if (!is.null(client$token)) client$token()
 

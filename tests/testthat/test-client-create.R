@@ -253,7 +253,7 @@ test_that("a forked worker closes nothing of its parent's", {
 
 test_that("a call inside another call disturbs neither", {
   skip_unless_all()
-  server <- local_server()
+  server <- http_client(local_server())
   id <- env_create(server, "CartPole-v1", seed = 1)
   twin <- env_create(server, "CartPole-v1", seed = 1)
   env_reset(server, id)
@@ -280,7 +280,7 @@ test_that("a call inside another call disturbs neither", {
 
 test_that("a call of one client inside another's disturbs neither", {
   skip_unless_all()
-  server <- local_server()
+  server <- http_client(local_server())
   other <- create_GymClient(server$remote_base)
   id <- env_create(server, "CartPole-v1", seed = 1)
   env_reset(server, id)
@@ -314,6 +314,7 @@ test_that("an interrupt that jumps out of libcurl leaves a client that works", {
   # Curl asks R for the body. Then an interrupt is on its way, and it is taken at the next garbage
   # collection, which is made to come at one allocation after another: some are curl's own.
   output <- output_of_script(
+    "server <- create_GymClient(server$remote_base, config = httr::add_headers(a = 'b'))",
     "id <- env_create(server, 'CartPole-v1')",
     "invisible(env_reset(server, id))",
     "connection <- gym:::client_state(server)$connection",

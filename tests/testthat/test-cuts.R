@@ -5,7 +5,7 @@ cut_every <- function() if (identical(Sys.getenv("GYM_TEST_CUTS"), "all")) 1L el
 
 # `tell()` says where the next step is to be cut and returns how often that was done so far, and
 # the sizes of the last request and answer that passed whole.
-local_cutter <- function(server, frame = parent.frame()) {
+local_cutter <- function(server, way = NULL, frame = parent.frame()) {
   script <- file.path(system.file("server", package = "gym"), "tests", "cutting.py")
   if (!file.exists(script)) {
     script <- test_path("..", "..", "inst", "server", "tests", "cutting.py")
@@ -13,7 +13,8 @@ local_cutter <- function(server, frame = parent.frame()) {
   skip_if_not(file.exists(script), "the server's tests are not here")
   python <- the_session$servers[[server$remote_base]]$python
   proxy <- processx::process$new(
-    python, c(script, sub(".*:", "", server$remote_base)), stdin = "|", stdout = "|", stderr = NULL
+    python, c(script, sub(".*:", "", server$remote_base), way), stdin = "|", stdout = "|",
+    stderr = NULL
   )
   withr::defer(proxy$kill(), envir = frame)
   read <- function() {
@@ -35,10 +36,10 @@ local_cutter <- function(server, frame = parent.frame()) {
   )
 }
 
-test_that("a step that was cut at any byte is taken once, as JSON and as tensors", {
-  skip_unless_all()
+# Plays with cuts at the bytes of requests and answers, or of a stream's messages.
+expect_taken_once <- function(way) {
   server <- local_server(allow_module = "odd_environments")
-  cutter <- local_cutter(server)
+  cutter <- local_cutter(server, way)
   places <- c(request = 0, answer = 0)
   for (sub_envs in list(NULL, 3L)) {
     env <- local_env("CartPole-v1", seed = 7, num_envs = sub_envs, client = cutter$client)
@@ -71,7 +72,17 @@ test_that("a step that was cut at any byte is taken once, as JSON and as tensors
     expect_equal(counted, steps * max(sub_envs, 1L))
   }
   if (nzchar(Sys.getenv("GYM_TEST_CUTS"))) {
-    cat(sprintf("\ncuts-r: at %.0f bytes of requests and %.0f of answers, lost or doubled 0\n",
-                places[["request"]], places[["answer"]]))
+    cat(sprintf("\ncuts-r%s: at %.0f bytes of requests and %.0f of answers, lost or doubled 0\n",
+                way %||% "", places[["request"]], places[["answer"]]))
   }
+}
+
+test_that("a step that was cut at any byte is taken once, as JSON and as tensors", {
+  skip_unless_all()
+  expect_taken_once(NULL)
+})
+
+test_that("a message of a stream that was cut at any byte is taken once", {
+  skip_unless_all()
+  expect_taken_once("stream")
 })

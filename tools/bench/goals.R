@@ -25,6 +25,7 @@ check_goals <- function(rows) {
     if ("candidates" %in% parts) list(candidates_goal(rows)),
     if ("beside" %in% parts) beside_goals(rows),
     if ("wire" %in% parts) wire_goals(rows),
+    if ("stream" %in% parts) stream_goals(rows),
     if ("gradients" %in% parts) gradient_goals(rows),
     if ("tables" %in% parts) table_goals(rows),
     if ("memory" %in% parts) memory_goals(rows)

@@ -14,7 +14,7 @@ what_text <- function(summary) {
     summary$num_envs > 0, sprintf("%.0f sub-environment%s", summary$num_envs, plural),
     words[summary$part]
   )
-  ifelse(summary$part %in% c("env_rollouts", "gradients", "tables"), summary$env_id, text)
+  ifelse(summary$part %in% c("env_rollouts", "gradients", "tables", "stream"), summary$env_id, text)
 }
 
 # The parts of a run, each group a table of its own.
@@ -23,7 +23,8 @@ table_groups <- list(
   environments = c("env_rollouts", "candidates", "beside"),
   step = "wire",
   gradients = "gradients",
-  tables = "tables"
+  tables = "tables",
+  stream = "stream"
 )
 
 # A table for each group that was measured, with an empty line after it.

@@ -1,9 +1,10 @@
 """Connections that are cut after a number of bytes, and a client that numbers its requests.
 
-For tests. ``python cutting.py SERVER_PORT`` runs a proxy for clients in other processes. It prints
-its port and then reads commands: ``request 17`` or ``answer 170`` sets where to cut the next
-request to a step, or its response; ``none`` cuts nothing. It answers each with a line: the number
-of cuts, and the sizes of the last complete request and response.
+For tests. ``python cutting.py SERVER_PORT [stream]`` runs a proxy for clients in other processes.
+It prints its port and then reads commands: ``request 17`` or ``answer 170`` sets where to cut the
+next request to a step, or its response; ``none`` cuts nothing. It answers each with a line: the
+number of cuts, and the sizes of the last complete request and response. With ``stream`` these are
+the messages of streams; without it no stream can be opened.
 """
 
 import json
@@ -16,8 +17,8 @@ import threading
 class Cutter:
     """A proxy that forwards each byte at once, and cuts a connection on demand."""
 
-    def __init__(self, port, pattern=b"/step"):
-        self.port, self.pattern = port, pattern
+    def __init__(self, port, pattern=b"/step", streams=False):
+        self.port, self.pattern, self.streams = port, pattern, streams
         self.where, self.after = None, 0
         self.cuts = 0
         # The sizes of the last complete ones.
@@ -47,35 +48,48 @@ class Cutter:
         server = socket.create_connection(("127.0.0.1", self.port))
         with client, server:
             try:
-                while self._exchange(client, server):
+                while self._exchange(client, server, read_message, read_message):
                     pass
             except OSError:
                 pass
 
-    def _exchange(self, client, server):
+    def _exchange(self, client, server, read_request, read_answer):
         """Forward a request and its response; return whether to keep the connection."""
-        request = read_message(client)
+        request = read_request(client)
         if request is None:
             return False
+        if not self.streams:
+            request = request.replace(b"Upgrade: websocket\r\n", b"")
         where, after = self._cut_for(request)
         if where == "request":
             server.sendall(request[:after])
             return self._break(client, server)
         server.sendall(request)
-        answer = read_message(server)
+        answer = read_answer(server)
         if answer is None:
+            return False
+        if answer.startswith(b"HTTP/1.1 101 "):
+            head, _, begun = answer.partition(b"\r\n\r\n")
+            client.sendall(head + b"\r\n\r\n" + read_frame(server, begun))
+            while self._exchange(client, server, read_frame, read_frame):
+                pass
             return False
         if where == "answer":
             client.sendall(answer[:after])
             return self._break(client, server)
-        if self.pattern in request.split(b"\r\n", 1)[0]:
+        if self._is_meant(request):
             self.sizes = {"request": len(request), "answer": len(answer)}
         client.sendall(answer)
         return True
 
+    def _is_meant(self, request):
+        if self.streams:
+            return request[0] == BINARY
+        return self.pattern in request.split(b"\r\n", 1)[0]
+
     def _cut_for(self, request):
         with self._lock:
-            if self.where is None or self.pattern not in request.split(b"\r\n", 1)[0]:
+            if self.where is None or not self._is_meant(request):
                 return None, 0
             cut = self.where, self.after
             self.where = None
@@ -112,6 +126,27 @@ def read_message(connection):
             return None
         body += chunk
     return head + b"\r\n\r\n" + body
+
+
+BINARY = 0x82
+
+
+def read_frame(connection, frame=b""):
+    """Return one frame of a WebSocket, of which some bytes were read; None at the end."""
+
+    def fill(size):
+        nonlocal frame
+        while len(frame) < size and (chunk := connection.recv(size - len(frame))):
+            frame += chunk
+        return len(frame) >= size
+
+    if not fill(2):
+        return None
+    size, masked = frame[1] & 0x7F, frame[1] >> 7
+    at = {126: 4, 127: 10}.get(size, 2)
+    if at > 2 and fill(at):
+        size = int.from_bytes(frame[2:at], "big")
+    return frame if fill(at + 4 * masked + size) else None
 
 
 class NumberedClient:
@@ -155,7 +190,7 @@ class NumberedClient:
 
 
 def main():
-    cutter = Cutter(int(sys.argv[1]))
+    cutter = Cutter(int(sys.argv[1]), streams=sys.argv[2:] == ["stream"])
     print(cutter.address[1], flush=True)
     for line in sys.stdin:
         where, _, after = line.strip().partition(" ")

@@ -3,11 +3,12 @@
 import json
 import socket
 import struct
+import urllib.parse
 
 import raw_http
 
 REQUEST = struct.Struct("<BBHxxxxd")
-ANSWER = struct.Struct("<BxHId")
+ANSWER = struct.Struct("<BxHIxxxxd")
 STEP, RESET = 0, 1
 ARRAYS, JSON_BODY, TENSOR_BODY = 0, 1, 2
 
@@ -39,11 +40,12 @@ def frame(content, first=0x82, mask=b"\0\0\0\0"):
 class StreamClient:
     """Sends messages, numbered from 1."""
 
-    def __init__(self, address, instance, key="k", order=None, *headers):
-        query = f"?key={key}" + ("" if order is None else f"&order={order}")
+    def __init__(self, address, instance, *headers, **query):
+        query = {"key": "k", **{name: word for name, word in query.items() if word is not None}}
+        path = f"{instance}/stream/?{urllib.parse.urlencode(query)}"
         self.socket = socket.create_connection(address, timeout=30)
         self.number = 0
-        self.socket.sendall(upgrade(f"{instance}/stream/{query}", *headers))
+        self.socket.sendall(upgrade(path, *headers))
         self._data = b""
         while b"\r\n\r\n" not in self._data:
             self._more()

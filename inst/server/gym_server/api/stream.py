@@ -60,20 +60,21 @@ _LARGEST_NUMBER = 2.0**53
 class Stream:
     """Answers the messages of one client about one instance."""
 
-    def __init__(self, call: Call, key: str, by_column: bool) -> None:
+    def __init__(self, call: Call, key: str, by_column: bool, as_float64: bool) -> None:
         """Prepare the stream.
 
         Args:
             call: the request that opens it.
             key: the key of its messages.
             by_column: whether arrays in answers are transposed, see ``COLUMN_TENSORS``.
+            as_float64: whether all numbers in answers are float64, if it can represent them.
         """
         self._services = call.services
         self._instance = call.instance
         self._instance_id = self._instance.instance_id
         self._key = key
         self._by_column = by_column
-        self._layout = StreamLayout(self._instance, by_column)
+        self._layout = StreamLayout(self._instance, by_column, as_float64)
         self._was_taken_over = False
 
     def serve(self, client: socket.socket, rest: bytes) -> None:
@@ -116,8 +117,10 @@ class Stream:
             response = failure(error)
         if response.content_type == MESSAGE:
             return response.body
-        form = JSON_BODY if response.content_type == JSON else TENSOR_BODY
-        return ANSWER_HEAD.pack(form, response.status, 0, number) + response.body
+        if response.content_type == JSON:
+            head = ANSWER_HEAD.pack(JSON_BODY, response.status, 0, number)
+            return head + self._layout.padded(response.body)
+        return ANSWER_HEAD.pack(TENSOR_BODY, response.status, 0, number) + response.body
 
     def _perform(
         self, what: int, form: int, flags: int, number: float, data: bytes

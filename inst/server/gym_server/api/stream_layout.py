@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Dict, Discrete, Space, Tuple
 
 from gym_server import spaces
 from gym_server.errors import GymServerError
@@ -20,8 +21,12 @@ from gym_server.protocol.safetensors import Parts, Tensor, check_booleans, place
 # Of a client's message: what it asks for, the form of the rest, flags, and the request's number.
 REQUEST_HEAD = struct.Struct("<BBHxxxxd")
 # Of an answer: the form of the rest, the status in HTTP's words, the size of the JSON at the end,
-# and the request's number.
-ANSWER_HEAD = struct.Struct("<BxHId")
+# and the request's number. With the head of a frame of usual size it has 24 bytes, so a reader can
+# take a whole message as float64.
+ANSWER_HEAD = struct.Struct("<BxHIxxxxd")
+
+# No answer is smaller, so that the heads of all usual frames have 4 bytes.
+_FEWEST_BYTES = 112
 
 STEP, RESET = 0, 1
 ARRAYS, JSON_BODY, TENSOR_BODY = 0, 1, 2
@@ -45,11 +50,20 @@ class ArrayLayout:
         size: the bytes of all.
     """
 
-    def __init__(self, shapes: spaces.Shapes) -> None:
-        """Place the arrays."""
+    def __init__(self, shapes: spaces.Shapes, as_float64: bool = False) -> None:
+        """Place the arrays.
+
+        Args:
+            shapes: their dtypes and shapes.
+            as_float64: whether their numbers travel as float64.
+        """
         self._shapes = shapes
-        self.table = places((name, *shape) for name, shape in shapes.items())
+        self._as_float64 = as_float64
+        self.table = places(
+            (name, "F64" if as_float64 else dtype, shape) for name, (dtype, shape) in shapes.items()
+        )
         self.size = max((entry["data_offsets"][1] for entry in self.table.values()), default=0)
+        self.padded_size = max(_FEWEST_BYTES, self.size + -self.size % 8)
 
     def read(self, data: bytes) -> Parts:
         """Return the arrays of a message.
@@ -71,26 +85,35 @@ class ArrayLayout:
         return Parts(tensors)
 
     def write(self, tensors: Mapping[str, Tensor]) -> bytes | None:
-        """Return arrays as bytes; None if one has another dtype or shape."""
+        """Return arrays as bytes, padded; None if one has another dtype or shape."""
         for name, (dtype, shape) in self._shapes.items():
             tensor = tensors[name]
             if tensor.dtype != dtype or tensor.shape != shape:
                 return None
-        return b"".join([tensors[name].data for name in self.table])
+        if not self._as_float64:
+            whole = b"".join([tensors[name].data for name in self.table])
+            return whole.ljust(self.padded_size, b"\0")
+        numbers = np.zeros(self.padded_size // 8)
+        for name, place in self.table.items():
+            begin, end = place["data_offsets"]
+            numbers[begin // 8 : end // 8] = tensors[name].flat()
+        return numbers.astype("<f8", copy=False).tobytes()
 
 
 class StreamLayout:
     """The layouts of the messages about one instance."""
 
-    def __init__(self, instance: Instance, by_column: bool) -> None:
+    def __init__(self, instance: Instance, by_column: bool, as_float64: bool) -> None:
         """Find what has a fixed size.
 
         Args:
             instance: the instance.
             by_column: whether arrays in answers are transposed, see ``COLUMN_TENSORS``.
+            as_float64: whether all numbers in answers are float64, if it can represent them.
         """
         self.num_envs = instance.config.num_envs
         self._by_column = by_column
+        self._as_float64 = as_float64 and _fits_float64(instance.single_observation_space)
         self._action = spaces.tensor_shapes(instance.single_action_space, "action")
         self._observation = spaces.tensor_shapes(instance.single_observation_space, "observation")
         # By the number of rows: those of all sub-environments, and of the last mask.
@@ -104,6 +127,11 @@ class StreamLayout:
         parts = {"action": self.action(self.num_envs), "step": step, "reset": self._reset}
         tables = {name: part and part.table for name, part in parts.items()}
         return dumps({"num_envs": self.num_envs, **tables})
+
+    def padded(self, body: bytes) -> bytes:
+        """Return JSON that is not smaller than the arrays that a client expects."""
+        step = self._of_step(self.num_envs)
+        return body.ljust(_FEWEST_BYTES if step is None else step.padded_size)
 
     def action(self, rows: int | None) -> ArrayLayout | None:
         """Return the layout of the actions of so many rows; None if their size varies."""
@@ -155,7 +183,21 @@ class StreamLayout:
         shapes = _batched({**self._observation, **others}, rows)
         if self._by_column:
             shapes = {name: (dtype, shape[::-1]) for name, (dtype, shape) in shapes.items()}
-        return ArrayLayout(shapes)
+        return ArrayLayout(shapes, self._as_float64)
+
+
+def _fits_float64(space: Space) -> bool:
+    """Return whether float64 can represent the numbers of all members."""
+    match space:
+        case Tuple():
+            return all(map(_fits_float64, space.spaces))
+        case Dict():
+            return all(map(_fits_float64, space.spaces.values()))
+        case Discrete():
+            return abs(int(space.start)) + int(space.n) <= 2**53
+        case _:
+            dtype = space.dtype
+            return dtype is not None and (dtype.kind == "f" or dtype.itemsize < 8)
 
 
 def _batched(shapes: spaces.Shapes, rows: int | None) -> spaces.Shapes:

@@ -15,17 +15,21 @@ from gym_server.response import Response
 bp = RouteBlueprint("stream")
 
 
-def _order(value: object) -> str:
-    if value != "column":
-        raise ValueError
-    return "column"
+def _word(word: str) -> Kind:
+    def is_word(value: object) -> bool:
+        if value != word:
+            raise ValueError
+        return True
+
+    return Kind(f'"{word}"', is_word)
 
 
 @bp.declare(
     "GET",
     INSTANCE + "stream/",
     Field("key", KEY),
-    Field("order", Kind('"column"', _order)),
+    Field("order", _word("column")),
+    Field("numbers", _word("float64")),
 )
 def env_stream(call: Call) -> Response:
     """Open a WebSocket for steps and resets."""
@@ -42,7 +46,8 @@ def env_stream(call: Call) -> Response:
             "without a WebSocket, POST to step/ and reset/",
         )
     own = call.fields["key"] or uuid.uuid4().hex
-    stream = Stream(call, own, by_column=call.fields["order"] is not None)
+    by_column, as_float64 = (call.fields[name] is not None for name in ("order", "numbers"))
+    stream = Stream(call, own, by_column, as_float64)
     accepted = (
         ("Upgrade", "websocket"),
         ("Connection", "Upgrade"),

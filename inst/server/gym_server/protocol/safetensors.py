@@ -79,8 +79,11 @@ class Tensor(NamedTuple):
 
     def array(self) -> np.ndarray:
         """Return a copy of the array in native byte order."""
-        array = np.frombuffer(self.data, _DTYPES[self.dtype]).reshape(self.shape)
-        return array.astype(_NATIVE[self.dtype])
+        return self.flat().reshape(self.shape).astype(_NATIVE[self.dtype])
+
+    def flat(self) -> np.ndarray:
+        """Return the numbers in the order of their bytes."""
+        return np.frombuffer(self.data, _DTYPES[self.dtype])
 
 
 @dataclass(slots=True)

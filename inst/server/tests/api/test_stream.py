@@ -17,6 +17,7 @@ from test_fuzz import mutated
 from gym_server.protocol import safetensors
 
 PAGE = (Path(__file__).parents[2] / "PROTOCOL.md").read_text(encoding="utf-8")
+NUMBERS = (None, "float64")
 TENSORS = {"Accept": safetensors.TENSORS}
 
 
@@ -48,6 +49,10 @@ def data_of(file):
     return file[8 + int.from_bytes(file[:8], "little") :]
 
 
+def padded(data):
+    return data.ljust(max(112, len(data) + -len(data) % 8), b"\0")
+
+
 @pytest.mark.parametrize("num_envs", [None, 3])
 @pytest.mark.parametrize("space", sorted(set(SPACES) - {"nothing"}))
 def test_a_stream_says_what_http_says(shared, opened, space, num_envs):
@@ -62,7 +67,7 @@ def test_a_stream_says_what_http_says(shared, opened, space, num_envs):
         kind, body = by_http(shared, f"{theirs}/{path}/", **asked)
         if form == ARRAYS:
             # The arrays of a file, without its header.
-            assert content == data_of(body)
+            assert content == padded(data_of(body))
             info = json.loads(safetensors.read(body).metadata["info"])
             assert (last or {"info": {}}) == {"info": info}
         elif form == TENSOR_BODY:
@@ -85,12 +90,29 @@ def test_arrays_of_actions_are_taken_and_a_mask_selects_sub_environments(shared,
     by_http(shared, f"{theirs}/reset/")
     content = stream.step(0, 1, 1)[2]
     wanted = data_of(by_http(shared, f"{theirs}/step/", action=[0, 1, 1])[1])
-    assert (content == wanted) is (order is None)
+    assert (content == padded(wanted)) is (order is None)
     assert stream.layout["step"]["observation"]["shape"] == ([3, 4] if order is None else [4, 3])
     masked = bytes([1, 0, 1, 0, 0, 0, 0, 0]) + struct.pack("<2q", 1, 0)
     content = stream.ask(STEP, ARRAYS, masked, flags=8)[2]
     wanted = by_http(shared, f"{theirs}/step/", action=[1, 0], step_mask=[True, False, True])[1]
-    assert sorted(content) == sorted(data_of(wanted))
+    assert sorted(content) == sorted(padded(data_of(wanted)))
+
+
+@pytest.mark.parametrize("space", ["Box", "bytes", "Discrete"])
+@pytest.mark.parametrize("num_envs", [None, 3])
+def test_numbers_come_as_float64_where_it_can_represent_all(shared, opened, space, num_envs):
+    fields = {"kwargs": {"space": space}, "seed": 1, "num_envs": num_envs}
+    found = []
+    for numbers in (None, "float64"):
+        stream = opened(shared.create("faulty_envs:Uneven-v0", **fields), numbers=numbers)
+        reset = stream.arrays(stream.reset()[2], "reset")
+        action = shared.get(f"{stream.url}/action_space/sample/")[1]["action"]
+        body = json.dumps({"action": action}).encode()
+        found.append((reset, stream.arrays(stream.ask(STEP, JSON_BODY, body)[2])))
+    assert found[0] == found[1]
+    assert {place["dtype"] for place in stream.layout["step"].values()} == {"F64"}
+    # This one has larger integers.
+    assert opened(numbers="float64").layout["reset"]["observation"]["dtype"] == "I64"
 
 
 def test_last_observations_of_episodes_come_as_a_file(shared, opened):
@@ -210,7 +232,7 @@ def test_only_who_may_use_the_server_opens_a_stream(attacked, ask):
         ((token, "Sec-Fetch-Site: cross-site", "Sec-Fetch-Mode: websocket"), 403),
         ((token,), 101),
     ):
-        opened = StreamClient(("127.0.0.1", attacked.port), url, "k", None, *headers)
+        opened = StreamClient(("127.0.0.1", attacked.port), url, *headers)
         assert opened.status == status, headers
         opened.close()
     path = f"{url}/stream/"

@@ -83,7 +83,7 @@ def test_nobody_sees_steps_watches_closes_or_stops_what_another_has(front, event
 
 def test_a_stream_passes(front):
     url, authorization = front.make("anna"), f"Authorization: Bearer {ANNA}"
-    stream = StreamClient(("127.0.0.1", front.port), url, "k", None, authorization)
+    stream = StreamClient(("127.0.0.1", front.port), url, authorization)
     with contextlib.closing(stream):
         assert stream.step(1)[1] == 200
         assert stream.step(1)[1] == 200

@@ -1,0 +1,193 @@
+# What a step and a reset send by a stream, and how the answers are read. Usual answers are numbers
+# of one dtype, which R reads at once.
+
+# With more numbers in an answer HTTP is faster: R reads from a socket in pieces of 4 kB.
+most_streamed <- 8000
+
+# Whether the answers of so many sub-environments go by a stream.
+pays_to_stream <- function(space, num_envs) {
+  numbers <- count_numbers(space)
+  is.na(numbers) || (num_envs %||% 1L) * (numbers + 3) <= most_streamed
+}
+
+# Whether R's integers and doubles can represent a space's numbers that come as float64.
+takes_numbers <- function(space) {
+  if (inherits(space, "gym_space_discrete")) {
+    within_integer(unlist(space_bounds(space)))
+  } else {
+    inherits(space, "gym_space_array") && (is_float(space) || space$dtype %in% small_dtypes)
+  }
+}
+
+small_dtypes <- c("int8", "int16", "uint8", "uint16")
+
+#' Prepare the messages of a kind of steps
+#' @param request The prepared request by HTTP, an environment.
+#' @param stream An open stream.
+#' @return A list for [ask_stream()], with `write`, a function of an action that returns its bytes,
+#'   or `NULL` for one that `request` must check. `FALSE` if such steps go by HTTP.
+#' @noRd
+step_message <- function(instance, request, stream, render, named, infos, finals) {
+  num_envs <- instance$num_envs
+  n <- if (is.null(num_envs) || is.null(request$which)) num_envs else length(request$which)
+  selects <- !identical(n, num_envs)
+  numbers <- has_numbers(stream$layout$step)
+  if (!pays_to_stream(instance$single_observation_space, num_envs) || selects && !numbers) {
+    return(FALSE)
+  }
+  message <- if (numbers) {
+    space <- sent_space(instance$single_observation_space, n)
+    count <- prod(space$shape) + 3 * (n %||% 1)
+    numbers_message(request, count, step_reader_of_numbers(space, n, named))
+  } else {
+    arrays_message(request, stream$layout$step)
+  }
+  write <- array_writer(instance$single_action_space, n)
+  message$write <- if (selects) {
+    mask <- c(as.raw(seq_len(num_envs) %in% request$which), raw(-num_envs %% 8))
+    function(action) if (!is.null(bytes <- write(action))) c(mask, bytes)
+  } else {
+    write
+  }
+  flags <- sum(c(1L, 2L, 4L, 8L)[c(!infos, !finals, render, selects)])
+  sizes <- vapply(stream$layout$action, function(entry) entry$size, 0)
+  size <- sum(sizes) / (num_envs %||% 1) * (n %||% 1) + if (selects) length(mask) else 0
+  message$head <- message_head(size, 0L, 0L, flags)
+  message
+}
+
+reset_message <- function(instance, request, stream, named) {
+  n <- instance$num_envs
+  if (!pays_to_stream(instance$single_observation_space, n)) {
+    return(FALSE)
+  }
+  if (!has_numbers(stream$layout$reset)) {
+    return(arrays_message(request, stream$layout$reset))
+  }
+  space <- sent_space(instance$single_observation_space, n)
+  count <- prod(space$shape)
+  observe <- observation_of_numbers(space, named)
+  numbers_message(request, count, function(numbers, json = NULL) {
+    list(observation = observe(numbers), info = read_info(json, n))
+  })
+}
+
+# Keeps what is known of the messages of a prepared request. If a stream broke, and the answer is
+# asked for by HTTP, it comes as a message.
+keep_message <- function(request, message) {
+  result <- request$result
+  request$result <- function(answer) {
+    if (is.null(answer$message)) {
+      result(answer)
+    } else {
+      read_stream_answer(message, answer$message, NULL)
+    }
+  }
+  request$message <- message
+}
+
+# Answers of numbers ---------------------------------------------------------------------------
+
+has_numbers <- function(layout) {
+  length(layout) && identical(names(layout)[[1L]], "observation") &&
+    all(vapply(layout, function(entry) entry$dtype == "F64", NA))
+}
+
+# The numbers of the heads of the frame and the message.
+before_numbers <- 3L
+
+# The fewest numbers of an answer.
+fewest_numbers <- 14L
+
+#' Describe answers that are numbers of one dtype
+#' @param request As for [step_message()].
+#' @param count How many numbers there are.
+#' @param read A function of the numbers of a message, its heads included, and of its JSON.
+#' @noRd
+numbers_message <- function(request, count, read) {
+  count <- before_numbers + max(count, fewest_numbers)
+  size <- 8L * as.integer(count) - 4L
+  result <- request$result
+  first <- as.raw(c(0x82, 0x7e, size %/% 256L, size %% 256L, 0, 0, 200, 0))
+  list(
+    count = count, read = read, read_answer = result, url = request$url,
+    usual = c(readBin(first, "double", endian = "little"), 0),
+    read_bytes = function(bytes, json) {
+      read(c(double(before_numbers), readBin(bytes, "double", count, endian = "little")), json)
+    }
+  )
+}
+
+#' Make the function that takes an observation, or a batch, from an answer's numbers
+#' @noRd
+observation_of_numbers <- function(space, named) {
+  at <- before_numbers + seq_len(prod(space$shape))
+  is_integer <- !is_float(space)
+  labels <- if (named && inherits(space, "gym_space_box") && length(space$shape) <= 2L) space$names
+  placed <- if (length(space$shape) > 1L) {
+    c(list(dim = space$shape), if (!is.null(labels)) list(dimnames = list(NULL, labels)))
+  } else if (!is.null(labels)) {
+    list(names = labels)
+  }
+  function(numbers) {
+    values <- numbers[at]
+    if (is_integer) values <- as.integer(values)
+    if (!is.null(placed)) attributes(values) <- placed
+    values
+  }
+}
+
+#' Make the function that reads the result of a step from an answer's numbers
+#' @noRd
+step_reader_of_numbers <- function(space, n, named) {
+  observe <- observation_of_numbers(space, named)
+  rows <- n %||% 1L
+  reward_at <- before_numbers + prod(space$shape) + seq_len(rows)
+  terminated_at <- reward_at + rows
+  truncated_at <- terminated_at + rows
+  check <- function(done) {
+    if (anyNA(done)) abort_answer("A flag is not a number")
+  }
+  if (is.null(n)) {
+    function(numbers, json = NULL) {
+      terminated <- numbers[[terminated_at]] != 0
+      truncated <- numbers[[truncated_at]] != 0
+      done <- terminated || truncated
+      if (is.na(done)) check(done)
+      list(
+        observation = observe(numbers), reward = numbers[[reward_at]], done = done,
+        info = if (is.null(json)) empty_object else read_info(json, NULL),
+        terminated = terminated, truncated = truncated
+      )
+    }
+  } else {
+    function(numbers, json = NULL) {
+      terminated <- numbers[terminated_at] != 0
+      truncated <- numbers[truncated_at] != 0
+      done <- terminated | truncated
+      check(done)
+      observation <- observe(numbers)
+      list(
+        observation = observation, reward = numbers[reward_at], done = done,
+        info = if (is.null(json)) empty_object else read_info(json, n),
+        terminated = terminated, truncated = truncated, next_observation = observation
+      )
+    }
+  }
+}
+
+# Answers of other arrays ----------------------------------------------------------------------
+
+#' Describe answers that are arrays of several dtypes
+#' @noRd
+arrays_message <- function(request, layout) {
+  layout <- list(entries = layout, data = 0L)
+  result <- request$result
+  list(
+    count = NULL, usual = NULL, read_answer = result, url = request$url,
+    read_bytes = function(bytes, json) {
+      info <- json$info %||% empty_object
+      result(list(tensors = read_entries(bytes, layout), info = info, named = FALSE))
+    }
+  )
+}

@@ -1,0 +1,368 @@
+# Streams: WebSockets for the steps and resets of one instance, on sockets of base R. The work that
+# curl and HTTP do for a request takes several times as long as a step. inst/server/PROTOCOL.md
+# describes the messages.
+
+# R has some 128 connections for everybody.
+most_streams <- 32L
+
+# A stream that was used within so many messages of the session is not closed to open another one.
+recent_messages <- 1000
+
+#' Find the stream of an instance, and open it if it can be
+#'
+#' A stream is void in another process, after the end of the session in which it was made, and after
+#' a change of httr's settings, like the client's other connections.
+#' @return An environment with the instance's idempotency `keys`. Its `con` is `NULL` if the next
+#'   message must go by HTTP.
+#' @noRd
+stream_of <- function(instance) {
+  state <- client_state(instance$client)
+  stream <- instance$stream
+  if (is.null(stream) || !identical(stream$home, state$home)) {
+    if (is_own_stream(stream)) drop_stream(stream)
+    stream <- instance$stream <- new_stream(instance, state)
+  }
+  if (is.null(stream$con) && is.null(stream$why_http)) {
+    open_stream(stream)
+  }
+  stream
+}
+
+new_stream <- function(instance, state) {
+  stream <- new.env(parent = emptyenv())
+  stream$client <- instance$client
+  stream$state <- state
+  stream$home <- state$home
+  stream$pid <- Sys.getpid()
+  stream$session <- the_session
+  stream$route <- paste0(instance$route, "stream/")
+  stream$takes_numbers <- instance$takes_numbers
+  stream$place <- instance_place(instance$client, instance$id)
+  stream$keys <- keys_of_place(stream$place)
+  stream$busy <- FALSE
+  stream$failures <- 0L
+  stream$used <- 0
+  # Why messages go by HTTP for good, in words.
+  stream$why_http <- why_http(instance$client)
+  stream
+}
+
+is_own_stream <- function(stream) {
+  !is.null(stream) && identical(stream$session, the_session) && stream$pid == Sys.getpid()
+}
+
+# Clients and objects of one instance share its keys, because numbers must grow.
+keys_of_place <- function(place) {
+  place <- paste(place, Sys.getpid())
+  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
+}
+
+#' Find out why the steps of a client's environments go by HTTP
+#' @return The reason in words; `NULL` if they go by streams, as far as is known.
+#' @noRd
+why_http <- function(client) {
+  base <- client$remote_base
+  config <- client_config(client)
+  names <- setdiff(names(config$options), "timeout_ms")
+  if (!grepl("^http://[^/@]+(/|$)", base)) {
+    "https"
+  } else if (any(grepl("^proxy", names)) || !is_loopback(base) && has_proxy_variable()) {
+    "a proxy"
+  } else if (length(names) || length(config$headers)) {
+    "settings of httr"
+  } else if (timeout_of(client) < 1) {
+    "a timeout of less than a second"
+  } else {
+    client$state$why_http
+  }
+}
+
+has_proxy_variable <- function() {
+  any(nzchar(Sys.getenv(c("http_proxy", "HTTP_PROXY", "all_proxy", "ALL_PROXY"))))
+}
+
+# Opening and closing --------------------------------------------------------------------------
+
+open_stream <- function(stream) {
+  if (!make_room_for_stream()) {
+    return(FALSE)
+  }
+  stream$failures <- stream$failures + 1L
+  # An interrupt closes the socket, too.
+  con <- NULL
+  on.exit(if (is.null(stream$con) && !is.null(con)) close(con))
+  failed <- tryCatch(
+    suppressWarnings({
+      con <- connect_stream(stream)
+      layout <- if (is_upgraded(stream, con)) read_first_message(con)
+      is.null(layout)
+    }),
+    error = function(cnd) TRUE
+  )
+  if (failed) {
+    # The error, if there is one, comes from the request by HTTP.
+    if (stream$failures > 1L) stream$why_http <- stream$why_http %||% "no stream could be opened"
+    return(FALSE)
+  }
+  suspendInterrupts({
+    stream$layout <- layout
+    stream$con <- con
+    stream$failures <- 0L
+    the_session$streams <- c(the_session$streams, list(stream))
+  })
+  TRUE
+}
+
+# The open streams of this process.
+open_streams <- function() {
+  is_open <- function(stream) is_own_stream(stream) && !is.null(stream$con)
+  the_session$streams <- Filter(is_open, the_session$streams)
+  the_session$streams
+}
+
+drop_streams <- function(is_meant) {
+  for (stream in Filter(is_meant, open_streams())) drop_stream(stream)
+}
+
+# Closes the stream that was used least recently if there are too many. Returns whether there is
+# room: streams that are in use stay.
+make_room_for_stream <- function() {
+  streams <- open_streams()
+  if (length(streams) < most_streams) {
+    return(TRUE)
+  }
+  used <- vapply(streams, function(stream) stream$used, 0)
+  oldest <- streams[[which.min(used)]]
+  unused <- oldest$used < the_session$messages - recent_messages
+  if (unused) drop_stream(oldest)
+  unused
+}
+
+connect_stream <- function(stream) {
+  client <- stream$client
+  parts <- regmatches(client$remote_base, regexec(address_pattern, client$remote_base))[[1L]]
+  host <- gsub("^\\[|\\]$", "", parts[[2L]])
+  port <- if (nzchar(parts[[3L]])) as.integer(sub(":", "", parts[[3L]])) else 80L
+  timeout <- ceiling(timeout_of(client))
+  con <- socketConnection(
+    host, port, open = "r+b", blocking = TRUE, options = "no-delay", timeout = min(10, timeout)
+  )
+  query <- paste0("?key=", stream$keys$key, "&order=column",
+                  if (stream$takes_numbers) "&numbers=float64")
+  lines <- c(
+    paste0("GET ", parts[[4L]], stream$route, query, " HTTP/1.1"),
+    paste0("Host: ", parts[[2L]], parts[[3L]]),
+    "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+    paste0("Sec-WebSocket-Key: ", openssl::base64_encode(openssl::rand_bytes(16L))),
+    paste0("User-Agent: gym-R/", utils::packageVersion("gym")),
+    if (!is.null(client$token)) paste("Authorization: Bearer", client$token())
+  )
+  writeBin(charToRaw(paste0(c(lines, "", ""), collapse = "\r\n")), con)
+  con
+}
+
+address_pattern <- "^http://(\\[[^]]*\\]|[^/:]+)(:[0-9]+)?(.*)$"
+
+# Reads the head of the answer. A server without streams is remembered.
+is_upgraded <- function(stream, con) {
+  status <- readLines(con, 1L)
+  if (grepl("^HTTP/1.1 101 ", status)) {
+    while (nzchar(sub("\r$", "", readLines(con, 1L)))) NULL
+    socketTimeout(con, ceiling(timeout_of(stream$client)))
+    return(TRUE)
+  }
+  if (grepl("^HTTP/1.1 (404|405|426) ", status)) {
+    stream$why_http <- stream$state$why_http <- "the server has none, or a proxy before it"
+  }
+  FALSE
+}
+
+# The layout of actions, steps and resets, each as the entries of read_layout(); `NULL` for what has
+# no fixed layout.
+read_first_message <- function(con) {
+  message <- read_message(con)
+  tables <- from_json(rawToChar(message$content))
+  layout_of <- function(table) {
+    if (!is.null(table)) Map(c, lapply(table, read_entry, TRUE), lapply(table, `[`, "dtype"))
+  }
+  lapply(tables[c("action", "step", "reset")], layout_of)
+}
+
+# Closes a stream's socket, unless somebody else has closed it and its number is another's by now.
+drop_stream <- function(stream) {
+  con <- stream$con
+  stream$con <- NULL
+  stream$busy <- FALSE
+  if (!is.null(con) && is_own_stream(stream) && is_same_connection(con)) close(con)
+}
+
+is_same_connection <- function(con) {
+  tryCatch(identical(getConnection(con), con), error = function(cnd) FALSE)
+}
+
+# Messages -------------------------------------------------------------------------------------
+
+#' Send a message by a stream and wait for its answer
+#'
+#' @param stream From [stream_of()], with a connection.
+#' @param message What is known of it and its answers, see [prepare_message()].
+#' @param content Its content after the number, a raw vector.
+#' @param head The frame's and the message's head.
+#' @return A list of one element: the result. If the stream broke, and the same must be asked by
+#'   HTTP, its number.
+#' @noRd
+ask_stream <- function(stream, message, content, head, call) {
+  keys <- stream$keys
+  number <- keys$number <- keys$number + 1
+  sent <- c(head, number_bytes(keys, number), content)
+  stream$used <- the_session$messages <- the_session$messages + 1
+  stream$busy <- TRUE
+  # Such as after an interrupt: what comes then is the answer to another message.
+  on.exit(if (stream$busy) drop_stream(stream))
+  answer <- exchange(stream$con, sent, message$count)
+  # The usual answer: arrays, nothing after them.
+  if (identical(answer[1:3], c(message$usual, number)) && length(answer) == message$count) {
+    stream$busy <- FALSE
+    return(list(message$read(answer)))
+  }
+  for (attempt in 1:2) {
+    answer <- finish_answer(stream, answer, message$count, call)
+    if (!is.null(answer)) {
+      stream$busy <- FALSE
+      return(list(read_stream_answer(message, answer, call)))
+    }
+    drop_stream(stream)
+    if (attempt > 1L || !is.null(stream$why_http) || !open_stream(stream)) break
+    stream$busy <- TRUE
+    answer <- exchange(stream$con, sent, message$count)
+  }
+  number
+}
+
+# Sends a message and reads so many numbers of the answer, or with `NULL` none. NULL if the
+# connection broke. tryCatch() would take three times as long.
+exchange <- function(con, sent, count) {
+  delayedAssign("broke", return(NULL))
+  withCallingHandlers(
+    {
+      if (!identical(getConnection(con), con)) broke
+      writeBin(sent, con)
+      if (is.null(count)) double() else readBin(con, "double", count, endian = "little")
+    },
+    error = function(cnd) broke,
+    warning = function(cnd) broke
+  )
+}
+
+# The idempotency key of a request by HTTP: of its own, or of a message by a stream that broke.
+stream_key <- function(stream, number = NULL) {
+  if (is.null(number)) next_key(stream$keys) else list(key = stream$keys$key, number = number)
+}
+
+# The bytes of a number. Writing many at once takes as long as writing one.
+number_bytes <- function(keys, number) {
+  at <- number - (keys$first_number %||% Inf) + 1
+  if (at < 1 || at > length(keys$bytes)) {
+    keys$first_number <- number
+    bytes <- writeBin(number + 0:255, raw(), endian = "little")
+    keys$bytes <- lapply(seq_len(256L), function(i) bytes[8L * i - 7:0])
+    at <- 1
+  }
+  keys$bytes[[at]]
+}
+
+#' Read the rest of an answer
+#'
+#' @param begun Its first bytes, as numbers; `NULL` if the connection broke.
+#' @param count How many numbers were asked for.
+#' @return The content of the message; `NULL` if the stream has ended.
+#' @noRd
+finish_answer <- function(stream, begun, count, call) {
+  if (is.null(begun)) {
+    return(NULL)
+  }
+  begun <- writeBin(begun, raw(), endian = "little")
+  # If fewer numbers came than asked for, no more will come.
+  answer <- if (length(begun) == 8 * (count %||% 0)) {
+    tryCatch(suppressWarnings(read_message(stream$con, begun)), error = function(cnd) NULL)
+  }
+  start <- if (is.null(answer)) begun else c(answer$first, raw(1L), answer$content)
+  if (identical(start[1L], as.raw(0x88))) {
+    if (identical(start[3:4], taken_over)) {
+      stream$why_http <- "another client has taken the stream over"
+    }
+    return(NULL)
+  }
+  if (is.null(answer) && is_same_connection(stream$con) &&
+        !socketSelect(list(stream$con), FALSE, 0)) {
+    seconds <- timeout_of(stream$client)
+    abort_connection(
+      stream$client$remote_base, paste("Operation timed out after", seconds, "seconds"), call
+    )
+  }
+  answer$content
+}
+
+# The code of a closing frame, 4001.
+taken_over <- as.raw(c(4001 %/% 256, 4001 %% 256))
+
+#' Read a message of the server
+#' @param begun Its first bytes, as far as they have been read.
+#' @return A list of the frame's `first` byte and its `content`. An error if the connection ends.
+#' @noRd
+read_message <- function(con, begun = raw()) {
+  take <- function(size) {
+    missing <- size - length(begun)
+    if (missing > 0) {
+      more <- readBin(con, "raw", missing)
+      if (length(more) < missing) stop("The stream has ended.")
+      begun <<- c(begun, more)
+    }
+  }
+  take(2)
+  size <- as.integer(begun[[2L]])
+  at <- 2
+  if (size > 125) {
+    at <- if (size == 126) 4 else 10
+    take(at)
+    size <- sum(as.integer(begun[3:at]) * 256^((at - 3):0))
+  }
+  if (size > max_answer_bytes()) abort_too_large()
+  take(at + size)
+  list(first = begun[1L], content = begun[at + seq_len(size)])
+}
+
+# Reads an answer that is not as usual: with infos, an error, or with other arrays.
+read_stream_answer <- function(message, content, call) {
+  head <- readBin(content, "integer", 4L, size = 2L, signed = FALSE, endian = "little")
+  json_size <- head[[3L]] + 65536 * head[[4L]]
+  rest <- content[-(1:20)]
+  form <- head[[1L]] %% 256L
+  if (form == 0L) {
+    size <- length(rest) - json_size
+    json <- if (json_size) json_answer(rest[size + seq_len(json_size)])
+    return(message$read_bytes(rest[seq_len(size)], json))
+  }
+  response <- list(
+    status_code = head[[2L]], content = rest, url = message$url,
+    type = if (form == 1L) json_type else column_tensors_type
+  )
+  message$read_answer(read_answer(with_answer(response), "POST", call))
+}
+
+#' Make the head of a message
+#' @param size The size of its content after the number, in bytes.
+#' @param what,form,flags As in the protocol.
+#' @noRd
+message_head <- function(size, what, form, flags = 0L) {
+  total <- size + 16
+  head <- if (total <= 125) {
+    as.raw(c(0x82, 0x80 + total))
+  } else if (total < 65536) {
+    as.raw(c(0x82, 0xfe, total %/% 256, total %% 256))
+  } else {
+    as.raw(c(0x82, 0xff, floor(total / 256^(7:0)) %% 256))
+  }
+  # The key that masks the content is zero.
+  c(head, raw(4L), as.raw(c(what, form, flags)), raw(5L))
+}
