@@ -31,13 +31,14 @@ def read_network(
     action_space: Space,
 ) -> NetworkPolicy:
     """Read candidates that are networks of the same sizes."""
+    observed, acted = _supported(observation_space), _supported(action_space)
     check_fields(
         document,
         tensors,
-        *("sizes", "activation", "bias", "output", "epsilon", "clip_obs"),
-        *("weights", "mean", "scale", "deviation"),
+        *("sizes", "activation", "bias", "output", "epsilon", "clip_obs", "weights"),
+        *(("mean", "scale") if isinstance(observed, Box) else ()),
+        *(("deviation",) if document.get("output") == "gaussian" else ()),
     )
-    observed, acted = _supported(observation_space), _supported(action_space)
     sizes = field(document, "sizes", _are_sizes, "two or more whole numbers from 1")
     _check_ends(sizes, observed, acted)
     plan = NetworkPlan(
@@ -48,7 +49,7 @@ def read_network(
         bias=field(document, "bias", _is_flag, "true or false") or False,
         output=_output(document, sizes[-1], acted),
         epsilon=epsilon_of(document),
-        **_moments(tensors, observed, sizes[0]),
+        **_moments(tensors, sizes[0]),
         clip_obs=above_zero(document, "clip_obs"),
     )
     if plan.output == "epsilon-greedy" and plan.epsilon is None:
@@ -88,18 +89,13 @@ def _is_flag(value: object) -> bool:
 def _check_ends(sizes: list[int], observed: Box | Discrete, acted: Box | Discrete) -> None:
     """Refuse a network whose inputs or outputs do not fit the environment."""
     inputs, outputs = _width(observed), _width(acted)
-    if sizes[0] != inputs:
-        raise invalid_policy(
-            f"The network takes {count_of(sizes[0], 'input')}, but an observation of the "
-            f"environment, {brief_space(observed)}, needs {inputs}",
-            f"make the first of its sizes {inputs}",
-        )
     chooses_by_one = isinstance(acted, Discrete) and (outputs, sizes[-1]) == (2, 1)
-    if sizes[-1] != outputs and not chooses_by_one:
+    if sizes[0] != inputs or (sizes[-1] != outputs and not chooses_by_one):
         raise invalid_policy(
-            f"The network gives {count_of(sizes[-1], 'output')}, but an action of the "
-            f"environment, {brief_space(acted)}, needs {outputs}",
-            f"make the last of its sizes {outputs}",
+            f"The network takes {count_of(sizes[0], 'input')} and gives "
+            f"{count_of(sizes[-1], 'output')}, but an observation of {brief_space(observed)} "
+            f"needs {inputs}, and an action of {brief_space(acted)} needs {outputs}",
+            f"make the first of its sizes {inputs}, and the last {outputs}",
         )
 
 
@@ -132,17 +128,9 @@ def _output(document: Mapping, outputs: int, space: Box | Discrete) -> str:
     return str(output)
 
 
-def _moments(
-    tensors: Mapping[str, np.ndarray], space: Box | Discrete, inputs: int
-) -> dict[str, np.ndarray]:
+def _moments(tensors: Mapping[str, np.ndarray], inputs: int) -> dict[str, np.ndarray]:
     if not {"mean", "scale"} & tensors.keys():
         return {}
-    if isinstance(space, Discrete):
-        raise invalid_policy(
-            f"Only observations of a Box can be normalized, but those of the environment are "
-            f"{brief_space(space)}",
-            "omit mean and scale",
-        )
     wanted = f"a number for each of its {count_of(inputs, 'input')}"
     return {name: finite_numbers(tensors, name, [(inputs,)], wanted) for name in ("mean", "scale")}
 
@@ -151,11 +139,6 @@ def _deviation(
     tensors: Mapping[str, np.ndarray], plan: NetworkPlan, candidates: int
 ) -> np.ndarray | None:
     if plan.output != "gaussian":
-        if "deviation" in tensors:
-            raise invalid_policy(
-                f'Standard deviations belong to the output "gaussian", not to "{plan.output}"',
-                "leave the tensor deviation out",
-            )
         return None
     shape = (candidates, plan.sizes[-1])
     wanted = (

@@ -44,8 +44,8 @@ CASES = [
     ({**NETWORK, "sizes": [4, 3, 1]}, WEIGHTS, "a row of 15 numbers for each candidate"),
     ({**NETWORK, "bias": True}, WEIGHTS, "4-2-1 with a bias needs, not 3 x 10"),
     ({**NETWORK, "bias": 1}, WEIGHTS, "bias must be true or false, not 1"),
-    ({**NETWORK, "sizes": [3, 2, 1]}, WEIGHTS, "takes 3 inputs, but an observation"),
-    ({**NETWORK, "sizes": [4, 2, 3]}, WEIGHTS, "gives 3 outputs, but an action of"),
+    ({**NETWORK, "sizes": [3, 2, 1]}, WEIGHTS, "takes 3 inputs and gives 1 output, but an observation of Box("),
+    ({**NETWORK, "sizes": [4, 2, 3]}, WEIGHTS, "gives 3 outputs, but an observation of"),
     ({**NETWORK, "sizes": [4]}, WEIGHTS, "two or more whole numbers from 1, not [4]"),
     ({**NETWORK, "sizes": [4, 0, 1]}, WEIGHTS, "not [4, 0, 1]"),
     ({**NETWORK, "sizes": [4, 2.0, 1]}, WEIGHTS, "not [4, 2.0, 1]"),
@@ -72,7 +72,7 @@ CASES = [
     ({**LINEAR, "output": "epsilon-greedy"}, EIGHT, "needs an epsilon"),
     ({**LINEAR, "output": "epsilon-greedy", "epsilon": 1.5}, EIGHT, "from 0 to 1, not 1.5"),
     ({**LINEAR, "epsilon": float("nan")}, EIGHT, "epsilon must be a number from 0 to 1"),
-    (LINEAR, {**EIGHT, "deviation": np.ones(2)}, 'belong to the output "gaussian"'),
+    (LINEAR, {**EIGHT, "deviation": np.ones(2)}, 'no tensor "deviation"'),
     ({"kind": "list", "policies": []}, {}, "from 1 to 10,000"),
     ({"kind": "list", "policies": {"kind": "random"}}, {}, "from 1 to 10,000"),
     ({"kind": "list", "policies": [{"kind": "list"}]}, {}, "Policy 1 of the list"),
@@ -130,7 +130,7 @@ def test_a_box_without_bounds_has_no_scale():
 
 def test_a_discrete_observation_is_not_normalised():
     moments = {"mean": np.zeros(4), "scale": np.ones(4)}
-    assert "can be normalized" in refused(LINEAR, {**EIGHT, **moments}, FIELD).message
+    assert 'no tensor "mean"' in refused(LINEAR, {**EIGHT, **moments}, FIELD).message
 
 
 def test_fewer_random_actions_are_discrete():
