@@ -8,6 +8,7 @@ pauses of 300 us, in which caches cool down, as between a client's calls).
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import socket
 import sys
@@ -53,7 +54,8 @@ class SocketPipe(ConnectionPipe):
     def __init__(self, connection: Connection) -> None:
         """Take over one end."""
         self._socket = socket.socket(fileno=os.dup(connection.fileno()))
-        self._rest = b""
+        raw = io.FileIO(self._socket.fileno(), closefd=False)
+        self._reader = io.BufferedReader(raw, _READ_BYTES)
         connection.close()
 
     def send(self, message: bytes) -> None:
@@ -62,27 +64,11 @@ class SocketPipe(ConnectionPipe):
 
     def receive(self) -> bytes:
         """Wait for a message; see ``ConnectionPipe.receive()``."""
-        read = self._rest or self._read()
-        while len(read) < _LENGTH_BYTES:
-            read += self._read()
-        end = _LENGTH_BYTES + int.from_bytes(read[:_LENGTH_BYTES], "little")
-        if len(read) < end:
-            read = self._read_until(end, read)
-        self._rest = read[end:]
-        return read[_LENGTH_BYTES:end]
-
-    def _read(self) -> bytes:
-        read = self._socket.recv(_READ_BYTES)
-        if not read:
+        length = int.from_bytes(self._reader.read(_LENGTH_BYTES), "little")
+        message = self._reader.read(length)
+        if not length or len(message) < length:
             raise EOFError
-        return read
-
-    def _read_until(self, end: int, read: bytes) -> bytes:
-        pieces, length = [read], len(read)
-        while length < end:
-            pieces.append(self._read())
-            length += len(pieces[-1])
-        return b"".join(pieces)
+        return message
 
     def wake(self) -> None:
         """Make a ``receive()`` in another thread fail; see ``ConnectionPipe.wake()``."""

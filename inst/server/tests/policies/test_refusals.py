@@ -44,7 +44,7 @@ CASES = [
     ({**NETWORK, "sizes": [4, 3, 1]}, WEIGHTS, "a row of 15 numbers for each candidate"),
     ({**NETWORK, "bias": True}, WEIGHTS, "4-2-1 with a bias needs, not 3 x 10"),
     ({**NETWORK, "bias": 1}, WEIGHTS, "bias must be true or false, not 1"),
-    ({**NETWORK, "sizes": [3, 2, 1]}, WEIGHTS, "takes 3 inputs and gives 1 output, but an observation of Box("),
+    ({**NETWORK, "sizes": [3, 2, 1]}, WEIGHTS, "takes 3 inputs and gives 1 output, but an"),
     ({**NETWORK, "sizes": [4, 2, 3]}, WEIGHTS, "gives 3 outputs, but an observation of"),
     ({**NETWORK, "sizes": [4]}, WEIGHTS, "two or more whole numbers from 1, not [4]"),
     ({**NETWORK, "sizes": [4, 0, 1]}, WEIGHTS, "not [4, 0, 1]"),
