@@ -60,7 +60,7 @@ play <- list(
   learn = function(env_id, num_envs, steps) {
     system.time(suppressWarnings(learn_q(
       env_id, model = FALSE, num_envs = 1, total_steps = steps, seed = 1, client = client,
-      episodes = 1, eval_episodes = 1
+      episodes = 1, eval_episodes = 2
     )))[["elapsed"]]
   }
 )

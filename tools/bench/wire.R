@@ -95,7 +95,10 @@ start_recorder <- function(python, client) {
 # An environment that a client has made and stepped by way of the recorder, with both actions, and
 # what it takes to send such steps to the server itself.
 bare_step <- function(client, recorder, num_envs) {
-  by_way <- create_GymClient(sprintf("http://127.0.0.1:%d", ask(recorder, "port")))
+  # A header of httr's keeps the steps on HTTP.
+  by_way <- create_GymClient(
+    sprintf("http://127.0.0.1:%d", ask(recorder, "port")), config = httr::add_headers(By = "HTTP")
+  )
   env <- gym_make("CartPole-v1", num_envs = num_envs, seed = 1, client = by_way)
   env$reset(seed = 1)
   requests <- lapply(alternating(max(num_envs, 1L)), function(actions) {
