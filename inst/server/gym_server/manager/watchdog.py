@@ -1,4 +1,4 @@
-"""Kill processes that hang, close unused instances, and return free memory.
+"""Kill processes that hang, end unused instances and processes, and return free memory.
 
 The watchdog has its own thread, so that checking slows no call.
 """
@@ -14,6 +14,7 @@ from gym_server import memory
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
+from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import kill_overdue
 
 log = logging.getLogger(__name__)
@@ -72,6 +73,7 @@ class Watchdog:
         if self._limits.max_call_seconds:
             kill_overdue(self._limits.max_call_seconds)
         self._rollouts.kill_unwanted()
+        pool.end_old()
         if self._limits.idle_minutes:
             self._instances.evict_idle(self._limits.idle_minutes)
             if self._instances.env_ids() or self._rollouts.is_at_work:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 import time
 
-from gym_server import memory
 from gym_server.processes.cores import usable_cores
 from gym_server.processes.worker_process import WorkerProcess
 
@@ -20,19 +19,16 @@ _IDLE_SECONDS = 600.0
 class Pool:
     """Keeps at most as many processes as there are cores."""
 
-    def __init__(self, most: int | None = None, idle_seconds: float = _IDLE_SECONDS) -> None:
+    def __init__(self, most: int | None = None) -> None:
         """Start with no processes.
 
         Args:
             most: how many to keep; None for one per core.
-            idle_seconds: how long to keep an idle process.
         """
         self._most = usable_cores() if most is None else most
-        self._idle_seconds = idle_seconds
         self._lock = threading.Lock()
         # With the time each was added; the most recent one is last.
         self._idle: list[tuple[float, WorkerProcess]] = []
-        self._timer: threading.Timer | None = None
 
     def take(
         self,
@@ -69,27 +65,15 @@ class Pool:
             keeps = process.is_alive and len(self._idle) < self._most
             if keeps:
                 self._idle.append((time.monotonic(), process))
-            if keeps and self._timer is None:
-                self._start_timer()
         if not keeps:
             process.kill()
 
-    def _start_timer(self) -> None:
-        oldest, _ = self._idle[0]
-        left = oldest + self._idle_seconds - time.monotonic()
-        timer = threading.Timer(max(0.0, left), self._end_old)
-        timer.daemon = True
-        memory.start(timer)
-        self._timer = timer
-
-    def _end_old(self) -> None:
-        before = time.monotonic() - self._idle_seconds
+    def end_old(self) -> None:
+        """End the processes that were idle for too long."""
+        before = time.monotonic() - _IDLE_SECONDS
         with self._lock:
             old = [process for since, process in self._idle if since <= before]
             self._idle = [one for one in self._idle if one[0] > before]
-            self._timer = None
-            if self._idle:
-                self._start_timer()
         for process in old:
             process.kill()
 

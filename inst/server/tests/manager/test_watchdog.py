@@ -6,6 +6,7 @@ import pytest
 from conftest import created
 from running import is_running
 
+from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import kill_overdue
 from gym_server.threads import calls
 
@@ -74,3 +75,11 @@ def test_the_watchdog_ends_them(quick, monkeypatch):
     assert not seconds.wait(0.1)
     quick(max_call_seconds=300)
     assert seconds.wait(20)
+
+
+def test_processes_that_are_idle_for_long_are_ended(app, monkeypatch, eventually):
+    process = pool.take("gym_server.vector_envs.group_worker")
+    pool.put(process)
+    assert is_running(process.pid)
+    monkeypatch.setattr("gym_server.processes.pool._IDLE_SECONDS", 0.0)
+    eventually(lambda: not is_running(process.pid))

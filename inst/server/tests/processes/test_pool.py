@@ -1,6 +1,5 @@
 import os
 import signal
-import threading
 from types import SimpleNamespace
 
 import gymnasium
@@ -70,52 +69,19 @@ def test_what_others_must_not_get_is_not_kept(warm, eventually):
     eventually(lambda: not any(map(is_running, pids)))
 
 
-def test_they_end_after_a_while(warm, eventually):
-    warm(most=2, idle_seconds=0.2)
-    env = make()
-    pids = env.pids
-    env.close()
-    assert all(map(is_running, pids))
-    eventually(lambda: not any(map(is_running, pids)))
-
-
-class Clock:
-    """Replaces the modules ``time`` and ``threading``; the test triggers its timers."""
-
-    Lock = threading.Lock
-
-    def __init__(self):
-        self.now, self.timers = 0.0, []
-
-    def monotonic(self):
-        return self.now
-
-    def Timer(self, seconds, ring):  # noqa: N802
-        self.timers.append((self.now + seconds, ring))
-        return SimpleNamespace(start=lambda: None)
-
-    def go_on_to_the_next_timer(self):
-        self.now, ring = self.timers.pop(0)
-        ring()
-
-
-def test_none_waits_longer_because_another_one_came_later(warm, monkeypatch, eventually):
-    clock = Clock()
-    for module in ("time", "threading"):
-        monkeypatch.setattr(f"gym_server.processes.pool.{module}", clock)
-    pool = warm(most=2, idle_seconds=2.0)
+def test_each_ends_after_a_while(warm, monkeypatch, eventually):
+    pool = warm(most=2)
+    now = 0.0
+    clock = SimpleNamespace(monotonic=lambda: now)
+    monkeypatch.setattr("gym_server.processes.pool.time", clock)
     first, second = pool.take(GROUPS), pool.take(GROUPS)
     pool.put(first)
-    clock.now = 1.5
+    now = 500.0
     pool.put(second)
-    clock.go_on_to_the_next_timer()
-    assert clock.now == 2
+    now = 700.0
+    pool.end_old()
     eventually(lambda: not is_running(first.pid))
     assert is_running(second.pid)
-    clock.go_on_to_the_next_timer()
-    assert clock.now == 3.5
-    eventually(lambda: not is_running(second.pid))
-    assert clock.timers == []
 
 
 def test_one_that_has_ended_takes_no_place(warm, eventually):
