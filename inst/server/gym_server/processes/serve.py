@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import faulthandler
 import importlib
 import os
+import signal
 from collections.abc import Callable
 from functools import cache
 from multiprocessing.connection import Connection
 from typing import Any, cast
 
+from gym_server import logs
 from gym_server.errors import GymServerError, answer_to, environment_error
+from gym_server.processes import start
 from gym_server.processes.messages import read_call, refusal_message, result_message
 from gym_server.processes.pipe import Pipe
-from gym_server.processes.set_up import set_up_process
 
 # The progress of the running function, visible to the server; see ``WorkerProcess``.
 progress: Any = [0, 0]
@@ -27,7 +31,7 @@ def serve(calls: Connection, log_level: int, shared_progress: Any) -> None:
         shared_progress: two integers that the server can read.
     """
     global progress
-    set_up_process(log_level)
+    _set_up(log_level)
     progress = memoryview(shared_progress).cast("B").cast("q")
     pipe = Pipe(calls)
     while True:
@@ -40,6 +44,26 @@ def serve(calls: Connection, log_level: int, shared_progress: Any) -> None:
             pipe.send(message)
         except (OSError, ValueError):
             os._exit(1)
+
+
+def _set_up(log_level: int) -> None:
+    """Make this process end with the server and log as the server does.
+
+    Args:
+        log_level: the lowest level to log to standard error.
+    """
+    if hasattr(os, "setsid"):
+        # So that processes which the environment starts can be killed with it, and Ctrl-C reaches
+        # only the server.
+        os.setsid()
+    for name in ("SIGINT", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    start.exit_with_parent(group=True)
+    logs.set_up(log_level, " (process %(process)d)")
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        # Print where C code crashed.
+        faulthandler.enable()
 
 
 def _answer(name: str, args: tuple) -> bytes:

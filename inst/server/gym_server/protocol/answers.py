@@ -28,48 +28,14 @@ HTML = "text/html"
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
 
 
-# json holds the GIL while it writes, and no other call is answered meanwhile. This many numbers
-# take a few milliseconds.
-_AT_ONCE = 20_000
-
-
 def dumps(value: object) -> bytes:
     """Encode a value as strict JSON; non-finite numbers become strings."""
     try:
-        text = _text(value)
+        text = _encode(value)
     except (TypeError, ValueError, RecursionError):
         # Convert only now: the result of an ordinary step needs no conversion.
-        text = _text(plain(value))
+        text = _encode(plain(value))
     return text.encode("ascii")
-
-
-def _text(value: Any) -> str:
-    """Return JSON text, written in pieces if it is long."""
-    size = _size(value)
-    if size <= _AT_ONCE:
-        return _encode(value)
-    if type(value) is dict:
-        items = [_encode({key: None})[1:-5] + _text(item) for key, item in value.items()]
-        return f"{{{','.join(items)}}}"
-    rows = max(1, _AT_ONCE * len(value) // size)
-    if rows == 1:
-        return f"[{','.join(map(_text, value))}]"
-    pieces = [_encode(value[row : row + rows])[1:-1] for row in range(0, len(value), rows)]
-    return f"[{','.join(pieces)}]"
-
-
-def _size(value: Any) -> int:
-    """Return how many numbers a value holds, assuming that the rows of a list are alike."""
-    size = 1
-    while type(value) is list and value:
-        size *= len(value)
-        value = value[0]
-    if type(value) is not dict:
-        return size
-    inside = 0
-    for item in value.values():
-        inside += _size(item) if type(item) is list or type(item) is dict else 1
-    return size * inside
 
 
 class AnswerForm(NamedTuple):

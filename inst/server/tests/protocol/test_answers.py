@@ -1,6 +1,5 @@
 import json
 
-from gym_server.protocol import answers
 from gym_server.protocol.answers import dumps, response_to
 from gym_server.protocol.fields import RequestId
 
@@ -11,26 +10,6 @@ def test_json_out_is_strict():
 
 def test_floats_keep_their_digits():
     assert json.loads(dumps([0.1, 1 / 3])) == [0.1, 1 / 3]
-
-
-def test_what_is_long_is_written_in_pieces(monkeypatch):
-    longest = 0
-
-    def watched(value):
-        nonlocal longest
-        longest = max(longest, answers._size(value))
-        return encode(value)
-
-    encode = answers._encode
-    monkeypatch.setattr(answers, "_encode", watched)
-    for value in (
-        {"model": {"state": list(range(50_000)), 3: [0.5] * 30_000}, "a": [], "b": {}},
-        [[[row, column, "é"] for column in range(300)] for row in range(100)],
-        [[list(range(90_000))]],
-        {"observation": [{"a": [1]}] * 60_000, "info": {"x": None}},
-    ):
-        assert dumps(value) == encode(value).encode()
-    assert 0 < longest <= answers._AT_ONCE
 
 
 def test_half_a_surrogate_pair_travels():
