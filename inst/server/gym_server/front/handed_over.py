@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import socket
 from collections.abc import Callable
 
@@ -33,10 +35,13 @@ class HandedOver(socket.socket):
         Raises:
             OSError: there is none.
         """
-        _, taken, _, _ = socket.recv_fds(self, 1, 1)
-        if not taken:
+        message, taken, _, _ = socket.recv_fds(self, 1, 1)
+        if not message:
             self._stop()
             raise ConnectionError("the front hands over no more")
-        client = socket.socket(fileno=taken[0])
         self.send(b"x")
+        if not taken:
+            # The system has closed it.
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+        client = socket.socket(fileno=taken[0])
         return client, client.getpeername()
