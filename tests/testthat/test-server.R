@@ -277,7 +277,7 @@ test_that("with `users` each user has a server that ends with the session's", {
   skip_unless_all()
   withr::local_envvar(GYM_SERVER_TOKEN = NA)
   expect_no_message(server <- local_users_server(port = free_port()))
-  expect_error(env_list_all(server), "asks everybody", class = "gym_error_http_401")
+  expect_error(env_list_all(server), "is not this server", class = "gym_error_http_401")
   users <- lapply(user_tokens, function(token) create_GymClient(server$remote_base, token = token))
   pids <- vapply(users, function(user) get_request(user, "/v1/health/")$pid, 1L)
   env <- gym_make("CartPole-v1", client = users$anna)
