@@ -35,6 +35,7 @@ def crowded(monkeypatch):
         connections.append(socket.create_connection(("127.0.0.1", server.port), timeout=20))
         return connections[-1]
 
+    connect.silent = lambda: [one.rank[1] for one in server._connections].count(True)
     yield connect
     for connection in connections:
         connection.close()
@@ -55,12 +56,13 @@ def is_well(connection, sent=False):
 
 
 @pytest.mark.parametrize("begun", [b"", GET[:20]], ids=["silent", "half-sent"])
-def test_the_oldest_of_unknown_clients_leaves_for_a_new_one(crowded, begun):
+def test_the_oldest_of_unknown_clients_leaves_for_a_new_one(crowded, begun, eventually):
     known = [crowded(), crowded()]
     assert all(is_well(connection) for connection in known)
     unknown = [crowded() for _ in range(MOST - 2)]
     for connection in unknown:
         connection.sendall(begun)
+    eventually(lambda: crowded.silent() == (len(known) if begun else MOST))
     new = [crowded(), crowded()]
     assert all(is_well(connection) for connection in (*new, *known))
     assert [connection.recv(1) for connection in unknown[:2]] == [b"", b""]
@@ -69,12 +71,14 @@ def test_the_oldest_of_unknown_clients_leaves_for_a_new_one(crowded, begun):
         assert is_well(connection, sent=True)
 
 
-def test_half_of_a_request_leaves_before_a_silent_client_that_is_known(crowded):
+def test_half_of_a_request_leaves_before_a_silent_client_that_is_known(crowded, eventually):
     silent = crowded()
     half = [crowded() for _ in range(MOST - 1)]
     assert all(is_well(connection) for connection in (silent, *half))
     for connection in half:
         connection.sendall(POST)
+    # The server has read what came, so that it knows who is silent.
+    eventually(lambda: crowded.silent() == 1)
     assert all(is_well(crowded()) for _ in range(3))
     assert is_well(silent)
 
