@@ -99,7 +99,8 @@ array_writer <- function(space, n) {
       if (is.integer(tensors)) int64_bytes(tensors) else tensors$action$bytes
     })
   }
-  if (inherits(space, "gym_space_discrete") && space$n <= most_prepared) {
+  if (inherits(space, "gym_space_discrete") && space$n <= most_prepared &&
+        within_integer(unlist(space_bounds(space)))) {
     return(discrete_writer(space))
   }
   limit <- if (inherits(space, "gym_space_box") && length(space$shape) == 1L) {
@@ -123,7 +124,7 @@ array_writer <- function(space, n) {
 most_prepared <- 1024
 
 discrete_writer <- function(space) {
-  values <- as.integer(space$start + seq_len(space$n) - 1L)
+  values <- as.integer(space$start + (seq_len(space$n) - 1L))
   bytes <- lapply(values, int64_bytes)
   before <- space$start - 1
   n <- length(bytes)

@@ -157,10 +157,16 @@ whole_from_halves <- function(bytes, n, signed) {
   check_bit64(sprintf("%.0f", numbers[which.max(abs(numbers))]))
   lost <- if (signed) is.na(upper) & lower %in% 0L else is.na(upper) | upper < 0L
   if (any(lost)) {
-    number <- numbers[lost][[1L]]
-    abort_whole(if (signed) "-9223372036854775808" else paste("near", format(number)))
+    abort_whole(if (signed) "-9223372036854775808" else digits_of_halves(lower[lost], upper[lost]))
   }
   structure(readBin(bytes, "double", n, size = 8L, endian = "little"), class = "integer64")
+}
+
+# The decimal digits of the first of some uint64. 2^32 is 4294967296, and no product loses a digit.
+digits_of_halves <- function(lower, upper) {
+  upper <- unsigned_half(upper[[1L]])
+  rest <- upper * 967296 + unsigned_half(lower[[1L]])
+  sprintf("%.0f%06.0f", upper * 4294 + rest %/% 1e6, rest %% 1e6)
 }
 
 # Whether all numbers fit R's integers.

@@ -5,7 +5,6 @@ test_that("a learner trains in the loop of all agents, exactly judged where ther
   expect_identical(learned$final$mean_return, 1)
   expect_identical(c(learned$final$se, learned$final$episodes), c(0, 0))
   expect_output(print(learned), "Expected return, by the model: 1", fixed = TRUE)
-  expect_output(print(summary(learned)), "The episodes of the last iteration", fixed = TRUE)
   expect_identical(predict(learned, 1:2), c(1L, 1L))
   expect_identical(predict(learned, 1:2, type = "output"), learned$agent$weights[2:3, ])
 })

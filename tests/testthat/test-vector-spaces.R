@@ -13,7 +13,7 @@ local_mirror_sub_envs <- function(frame = parent.frame()) {
 play_sub_envs <- function(env, values, tensors) {
   instance <- known_instance(env$client, env$instance_id)
   # Calls were prepared for the other way.
-  instance$prepared_resets[] <- instance$prepared_steps[] <- list(NULL)
+  instance$resets[] <- instance$steps[] <- list(NULL)
   instance$takes_tensors <- instance$takes_tensors && tensors
   instance$sends_tensors <- instance$sends_tensors && tensors
   n <- env$num_envs
