@@ -10,8 +10,8 @@
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
 #   [beside] [wire] [memory] [tables] runs parts.
 #
-#   make bench PARTS=stream      another build of this package against this one, see
-#                                tools/bench/stream.R
+#   make bench PARTS=stream      another build of this package against this one; see
+#                                tools/bench/stream.R on how to name it
 #
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
 #                                bench-gradients.csv and bench-gradients.md there.
@@ -20,8 +20,8 @@
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
-               "rollouts", "beside", "wire", "stream", "gradients", "tables", "results", "goals", "table",
-               "figure", "figure-environments")) {
+               "rollouts", "beside", "wire", "stream", "gradients", "tables", "results", "goals",
+               "table", "figure", "figure-environments")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
 source("vignettes/pictures.R")

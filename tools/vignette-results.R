@@ -55,7 +55,8 @@ strip <- function(search) {
 }
 # 500 searches with their episodes and policies have megabytes.
 results$searches$trainings <- lapply(results$searches$trainings, function(search) {
-  kept <- c("seed", "history", "solved", "stopped_early", "steps", "elapsed", "interrupted", "env_id")
+  kept <- c("seed", "history", "solved", "stopped_early", "steps", "elapsed", "interrupted",
+            "env_id")
   search$history <- search$history["iteration"]
   structure(search[kept], class = class(search))
 })

@@ -202,7 +202,9 @@ test_that("a token that is none ends the start, and is not shown", {
 test_that("off this machine a token is needed, or the word that none is", {
   skip_if_no_server()
   withr::local_envvar(GYM_SERVER_TOKEN = NA)
-  error <- expect_error(gym_server_start(host = "0.0.0.0", token = FALSE), class = "gym_error_server_start")
+  error <- expect_error(
+    gym_server_start(host = "0.0.0.0", token = FALSE), class = "gym_error_server_start"
+  )
   expect_match(conditionMessage(error), "--token-file")
 })
 
