@@ -63,8 +63,9 @@
 #' The server removes an environment if a call hangs in its worker processes, or if nobody has used
 #' or watched it for a day; see `max_call_seconds` and `idle_minutes` of [gym_server_start()]. Every
 #' later call then raises `gym_error_http_504` with code `call_too_long`, or `gym_error_http_410`
-#' with code `instance_idle_closed`. A call that hangs elsewhere ends the server. If a process of its
-#' sub-environments has ended, later calls raise `gym_error_http_500` with code `environment_died`.
+#' with code `instance_idle_closed`. A call that hangs elsewhere ends the server. If a process of
+#' its sub-environments has ended, later calls raise `gym_error_http_500` with code
+#' `environment_died`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
