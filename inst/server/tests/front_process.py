@@ -61,12 +61,3 @@ class FrontProcess(ServerProcess):
         """Take a step from a reset; return the status."""
         self.ask(TOKENS[name], "POST", f"{url}/reset/", {}, connection)
         return self.ask(TOKENS[name], "POST", f"{url}/step/", {"action": 0}, connection)[0]
-
-
-def is_running(pid):
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    with open(f"/proc/{pid}/stat") as file:
-        return file.read().rpartition(")")[2].split()[0] != "Z"

@@ -9,8 +9,9 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from front_process import TOKENS, FrontProcess, is_running, write_users
+from front_process import TOKENS, FrontProcess, write_users
 from raw_http import answered, read_answer, request
+from running import is_running
 from stream_client import StreamClient
 
 resource = pytest.importorskip("resource", reason="this system has no fronts")
