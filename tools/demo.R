@@ -17,12 +17,12 @@ for (attempt in 1:5) {
   seed <- sample.int(10000, 1)
   cat("search_random(seed = ", seed, ")\n\n", sep = "")
   result <- search_random(seed = seed)
+  if (result$solved) break
   print(result)
   cat("\n")
-  if (result$solved) break
 }
 
-cat("100 fresh episodes with this network:\n\n")
+# The search, and 100 fresh episodes with its network.
 print(summary(result))
 cat("\n")
 
