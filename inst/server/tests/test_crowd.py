@@ -35,9 +35,12 @@ def crowded(monkeypatch):
         connections.append(socket.create_connection(("127.0.0.1", server.port), timeout=20))
         return connections[-1]
 
-    connect.silent = lambda: [(one.rank or (0, False))[1] for one in server._connections].count(
-        True
-    )
+    def silent():
+        """Return how many connections wait for a request, once all are there and answered."""
+        ranks = [one.rank for one in list(server._connections)]
+        return len(ranks) == MOST and None not in ranks and sum(rank[1] for rank in ranks)
+
+    connect.silent = silent
     yield connect
     for connection in connections:
         connection.close()
@@ -62,9 +65,11 @@ def test_the_oldest_of_unknown_clients_leaves_for_a_new_one(crowded, begun, even
     known = [crowded(), crowded()]
     assert all(is_well(connection) for connection in known)
     unknown = [crowded() for _ in range(MOST - 2)]
-    for connection in unknown:
+    eventually(lambda: crowded.silent() == MOST)
+    for left, connection in enumerate(unknown, 1):
         connection.sendall(begun)
-    eventually(lambda: crowded.silent() == (len(known) if begun else MOST))
+        # One after another: the oldest is the one whose request the server has heard first.
+        eventually(lambda left=left: crowded.silent() == (MOST - left if begun else MOST))
     new = [crowded(), crowded()]
     assert all(is_well(connection) for connection in (*new, *known))
     assert [connection.recv(1) for connection in unknown[:2]] == [b"", b""]
