@@ -27,12 +27,16 @@ def _state(directory):
 
 def descendants(pid):
     """Return the descendants of a process."""
-    found = []
-    for task in Path(f"/proc/{pid}/task").glob("*/children"):
-        # The thread may have ended.
+    children = {}
+    for directory in Path("/proc").glob("[0-9]*"):
+        # The process may have ended. The lists of children that Linux keeps may lack some.
         with contextlib.suppress(OSError):
-            found += map(int, task.read_text().split())
-    return found + [one for child in found for one in descendants(child)]
+            parent = int((directory / "stat").read_text().rpartition(")")[2].split()[1])
+            children.setdefault(parent, []).append(int(directory.name))
+    found = [pid]
+    for one in found:
+        found += children.get(one, [])
+    return found[1:]
 
 
 def r_has_the_package():
