@@ -15,7 +15,7 @@ from pathlib import Path
 log = logging.getLogger(__name__)
 
 _MB = 2**20
-_CGROUP = Path("/sys/fs/cgroup")
+CGROUP = Path("/sys/fs/cgroup")
 
 # glibc's numbers for two settings of mallopt(), and our values. A block of _LARGE_BYTES or more,
 # such as a request's body, gets its own mapping, which is returned to the system when it is freed.
@@ -66,7 +66,19 @@ def give_back(garbage: bool = True) -> None:
         _malloc_trim(0)
 
 
-def machine_mb(cgroup: Path = _CGROUP) -> int:
+def own_group(cgroup: Path = CGROUP) -> Path:
+    """Return the folder of this process's control group of version 2.
+
+    Raises:
+        FileNotFoundError: it is in none.
+    """
+    for line in Path("/proc/self/cgroup").read_text().splitlines():
+        if line.startswith("0::/"):
+            return cgroup / line.removeprefix("0::/")
+    raise FileNotFoundError(0, "this process is in no group of version 2")
+
+
+def machine_mb(cgroup: Path = CGROUP) -> int:
     """Return the memory of the machine in MiB, or of its cgroup if that is less.
 
     Args:
@@ -75,9 +87,7 @@ def machine_mb(cgroup: Path = _CGROUP) -> int:
     sizes = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
     own = cgroup
     with contextlib.suppress(OSError):
-        for line in Path("/proc/self/cgroup").read_text().splitlines():
-            if line.startswith("0::/"):
-                own = cgroup / line.removeprefix("0::/")
+        own = own_group(cgroup)
     # A group may have as much as each group above it. The last file is of version 1.
     files = [group / "memory.max" for group in (own, *own.parents)]
     for file in (*files, cgroup / "memory" / "memory.limit_in_bytes"):

@@ -6,14 +6,16 @@ import contextlib
 import os
 from pathlib import Path
 
-_MOUNT = Path("/sys/fs/cgroup")
+from gym_server.memory import CGROUP, own_group
+
 _CONTROLLERS = "+memory +pids +cpu"
 
 # The threads and processes of one user. A server has a thread for each connection, and each of its
 # processes some for linear algebra.
 _MOST_TASKS = 4096
 
-# The front passes the bytes of all, so it comes before a user's server (100, the default).
+# The front hands over everybody's connections, so it comes before a user's server (100, the
+# default).
 _FRONT_WEIGHT, _USER_WEIGHT = 1000, 100
 
 
@@ -26,7 +28,9 @@ class ControlGroups:
         Raises:
             OSError: the system has no such groups, or this process may not make any.
         """
-        own = _own_group()
+        if not (CGROUP / "cgroup.controllers").exists():
+            raise FileNotFoundError(0, "no cgroup2 is mounted")
+        own = own_group()
         # A group with groups below it may have no processes of its own, so this one moves down.
         self._root = own / f"gym-{os.getpid()}"
         self._own, self._front = own, self._root / "front"
@@ -74,11 +78,3 @@ def remove(group: Path) -> None:
         (group / "cgroup.kill").write_text("1")
     with contextlib.suppress(OSError):
         group.rmdir()
-
-
-def _own_group() -> Path:
-    """Return the folder of this process's group."""
-    for group in Path("/proc/self/cgroup").read_text().splitlines():
-        if group.startswith("0::") and (_MOUNT / "cgroup.controllers").exists():
-            return _MOUNT / group.removeprefix("0::").lstrip("/")
-    raise FileNotFoundError(0, "no cgroup2 is mounted")

@@ -8,10 +8,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-_CGROUP = Path("/sys/fs/cgroup")
+from gym_server.memory import CGROUP
 
 
-def usable_cores(cgroup: Path = _CGROUP) -> int:
+def usable_cores(cgroup: Path = CGROUP) -> int:
     """Return how many cores this process may use: its affinity, capped by its cgroup's limit.
 
     Args:
