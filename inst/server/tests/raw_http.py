@@ -1,5 +1,7 @@
 """Speak HTTP on a socket. For tests."""
 
+from contextlib import suppress
+
 
 def request(method, path, body=b"", *headers):
     lines = [f"{method} {path} HTTP/1.1", "Host: 127.0.0.1", *headers]
@@ -33,3 +35,12 @@ def _receive(connection):
 def answered(connection, sent):
     connection.sendall(sent)
     return read_answer(connection)
+
+
+def read_all(connection):
+    """Return what comes until the connection ends."""
+    data = b""
+    with suppress(ConnectionError):
+        while more := connection.recv(65536):
+            data += more
+    return data

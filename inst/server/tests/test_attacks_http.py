@@ -10,6 +10,7 @@ from contextlib import closing, suppress
 
 import pytest
 from conftest import TOKEN
+from raw_http import read_all
 
 from gym_server.api.access import Access
 from gym_server.api.app import Config, create_app
@@ -28,11 +29,7 @@ def talk(server, sent, seconds=10):
         with suppress(OSError):
             connection.sendall(sent)
             connection.shutdown(socket.SHUT_WR)
-        received = b""
-        with suppress(ConnectionError):
-            while data := connection.recv(65536):
-                received += data
-    return received
+        return read_all(connection)
 
 
 def statuses(received):

@@ -6,6 +6,7 @@ import time
 from contextlib import suppress
 
 import pytest
+from raw_http import read_all
 
 from gym_server.http_server import connection as connection_module
 from gym_server.http_server.connection import Connection
@@ -88,14 +89,6 @@ def read_head(client):
         more = client.recv(65536)
         assert more, "closed without an answer"
         data += more
-    return data
-
-
-def read_all(client):
-    data = b""
-    with suppress(ConnectionError):
-        while more := client.recv(65536):
-            data += more
     return data
 
 
