@@ -76,6 +76,35 @@ test_that("by nginx the watch page waits for what is new, and no log has its key
   expect_false(any(grepl(key, c(log, gym_server_log(server)), fixed = TRUE)))
 })
 
+test_that("by nginx a stream is opened, which says its layout", {
+  skip_unless_all()
+  skip_if_no_nginx()
+  server <- local_locked_server(allow_host = "gym.example.org")
+  proxy <- local_proxy(server)
+  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
+  expect_identical(await_answer(client)$status, "ok")
+  env <- local_env(client = client)
+
+  handle <- curl::new_handle(
+    url = paste0(proxy$url, "/v1/envs/", env$instance_id, "/stream/"), .list = proxy$config$options
+  )
+  curl::handle_setheaders(
+    handle, Authorization = paste("Bearer", token_text), Connection = "Upgrade",
+    Upgrade = "websocket", "Sec-WebSocket-Version" = "13",
+    "Sec-WebSocket-Key" = "MDEyMzQ1Njc4OWFiY2RlZg=="
+  )
+  pool <- curl::new_pool()
+  received <- raw()
+  curl::multi_add(handle, data = function(bytes, ...) received <<- c(received, bytes), pool = pool)
+  expect_true(wait_until(function() {
+    curl::multi_run(timeout = 0, pool = pool)
+    length(received) > 4
+  }))
+  expect_identical(curl::handle_data(handle)$status_code, 101L)
+  # The head of a frame, and the layout as JSON.
+  expect_match(rawToChar(received[-(1:4)]), '"action":', fixed = TRUE)
+})
+
 test_that("by nginx without keepalive two users play on servers of their own", {
   skip_unless_all()
   skip_if_no_nginx()
