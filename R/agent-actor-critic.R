@@ -64,13 +64,12 @@ agent_start.gym_agent_actor_critic <- function(agent, policy) {
 }
 
 #' @exportS3Method
-learner_of.gym_agent_actor_critic <- function(agent) {
-  learning <- learning_of(agent)
+learner_of.gym_agent_actor_critic <- function(agent, draw) {
+  learning <- learning_of(agent, draw)
   critic <- learning$store
   actor <- value_store(
     agent$basis, agent$preferences, 0, as.integer(agent$spaces$action_space$n)
   )
-  draw <- learning$uniform$draw
   discount <- agent$discount
   rate <- rate_of(agent$learning_rate)
   actor_rate <- rate_of(agent$actor_rate, "actor_rate")
@@ -86,7 +85,7 @@ learner_of.gym_agent_actor_critic <- function(agent) {
   act <- function(x) draw_place(softmax(actor$row(x)), draw())
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) act(x),
+    act = function(x, sub_env, observation) act(x),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       traces <- trace_of(sub_env)
       ahead <- if (terminated) 0 else critic$row(after)

@@ -5,7 +5,7 @@
 #' episode only after its end. No value depends on another one.
 #'
 #' If `env` is an id on the server, the server's processes play all episodes of an iteration with
-#' the same table, and the learner learns from them afterwards. With exploring starts or a `mask`, R
+#' the same table, and the agent learns from them afterwards. With exploring starts or a `mask`, R
 #' plays the episodes in several sub-environments. In a model or an environment in R, the agent
 #' learns after each episode.
 #'
@@ -96,21 +96,20 @@ agent_start.gym_agent_monte_carlo <- function(agent, policy) {
 }
 
 #' @exportS3Method
-learner_of.gym_agent_monte_carlo <- function(agent) {
+learner_of.gym_agent_monte_carlo <- function(agent, draw) {
   if (agent$importance != "none") {
-    return(off_policy_steps(agent))
+    return(off_policy_steps(agent, draw))
   }
-  learning <- learning_of(agent)
+  learning <- learning_of(agent, draw)
   row <- learning$store$row
   choose <- learning$choose
-  draw <- learning$uniform$draw
   taken <- agent$taken
   returns <- new_returns(agent, learning$store)
   episode_of <- for_each_sub_env(new_episode)
   starts <- agent$exploring_starts
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) {
+    act = function(x, sub_env, observation) {
       values <- row(x)
       if (starts) draw_place(values > -Inf, draw()) else choose(values, taken)
     },
@@ -129,14 +128,7 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
     export = function(agent) {
       agent$visited <- returns$visited()
       agent
-    },
-    whole = list(
-      policy = function() iteration_policy(agent, learning$store$get(), taken),
-      learn = function(x, column, reward, episode) {
-        taken <<- taken + length(reward)
-        returns$learn_many(x, column, reward, episode, taken)
-      }
-    )
+    }
   )
 }
 
@@ -145,10 +137,9 @@ learner_of.gym_agent_monte_carlo <- function(agent) {
 #' The weight of a return is how much more likely the policy takes the actions after its own (Sutton
 #' and Barto 2018, section 5.7). The probabilities are those at the time of the action.
 #' @noRd
-off_policy_steps <- function(agent) {
-  learning <- learning_of(agent)
+off_policy_steps <- function(agent, draw) {
+  learning <- learning_of(agent, draw)
   store <- learning$store
-  draw <- learning$uniform$draw
   taken <- agent$taken
   weight_of <- agent$visited
   weighted <- agent$importance == "weighted"
@@ -183,7 +174,7 @@ off_policy_steps <- function(agent) {
   }
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) act(x, sub_env),
+    act = function(x, sub_env, observation) act(x, sub_env),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       episode <- episodes(sub_env)
       episode$add(x, column, reward)
@@ -220,22 +211,67 @@ agent_policy.gym_agent_monte_carlo <- function(agent) {
   if (is.null(agent$learns)) NextMethod() else agent$learns
 }
 
-# The policy that plays an iteration. It draws among actions with equal values.
-iteration_policy <- function(agent, weights, taken) {
+# Where the server's processes play whole episodes, it learns by iterations ------------------
+
+#' @export
+agent_needs.gym_agent_monte_carlo <- function(agent) c("returns", "trajectories")
+
+# It draws among actions with equal values.
+#' @export
+agent_behavior.gym_agent_monte_carlo <- function(agent) {
+  if (!plays_whole(agent)) {
+    return(NextMethod())
+  }
+  weights <- agent$weights
   heat <- agent$temperature
   if (is.null(heat)) {
     best <- any_best_column(weights)
     weights[] <- ifelse(weights == -Inf, -Inf, 0)
     weights[cbind(seq_along(best), best)] <- 1
   } else {
-    heat <- scheduled(heat, taken, "temperature", lowest_temperature, Inf)
+    heat <- scheduled(heat, agent$taken, "temperature", lowest_temperature, Inf)
   }
   # A state without actions is an end, where no action is taken.
   weights[row_max(weights) == -Inf, ] <- 0
-  policy <- policy_table(weights, rate_of(agent$epsilon, "epsilon")(taken), heat)
+  policy <- policy_table(weights, rate_of(agent$epsilon, "epsilon")(agent$taken), heat)
   policy[c("observation_space", "action_space")] <- agent$spaces
   policy
 }
+
+#' @export
+agent_tell.gym_agent_monte_carlo <- function(agent, results) {
+  steps <- results$trajectories
+  n <- length(steps$reward)
+  agent$taken <- agent$taken + n
+  cell <- agent$basis$of(steps$observation, n)[, 1L] +
+    nrow(agent$weights) * (action_columns(agent$spaces, steps$action) - 1)
+  returns <- sum_backwards(steps$reward, agent$discount, ends_of(steps$episode))
+  if (agent$visits == "first") {
+    counted <- !duplicated(cell + length(agent$weights) * (steps$episode - 1))
+    cell <- cell[counted]
+    returns <- returns[counted]
+  }
+  if (is.null(agent$learning_rate)) {
+    # All at once: the division of episodes into requests must not change the last bit of a sum.
+    sums <- rowsum(cbind(returns, 1), cell)
+    own <- as.double(rownames(sums))
+    agent$visited[own] <- agent$visited[own] + sums[, 2L]
+    missed <- sums[, 1L] - sums[, 2L] * agent$weights[own]
+    agent$weights[own] <- agent$weights[own] + missed / agent$visited[own]
+  } else {
+    share <- rate_of(agent$learning_rate)(agent$taken)
+    weights <- agent$weights
+    for (i in seq_along(cell)) {
+      at <- cell[[i]]
+      weights[[at]] <- weights[[at]] + share * (returns[[i]] - weights[[at]])
+    }
+    agent$weights <- weights
+    agent$visited[] <- agent$visited + tabulate(cell, length(weights))
+  }
+  agent
+}
+
+# Where it learns after each episode ----------------------------------------------------------
 
 # Keeps the steps of an episode until it has ended.
 new_episode <- function() {
@@ -260,7 +296,6 @@ new_episode <- function() {
 
 #' Keep the means of returns
 #' @return A list of functions: `learn(episode, taken)` learns from the steps of a whole episode;
-#'   `learn_many()` from those of several, where `episode` is the number of each step's episode;
 #'   `visited()` returns how often each state and action has counted.
 #' @noRd
 new_returns <- function(agent, store) {
@@ -278,28 +313,6 @@ new_returns <- function(agent, store) {
         visited[[at]] <<- visited[[at]] + 1
         share <- if (is.null(rate)) 1 / visited[[at]] else rate(taken)
         store$toward(episode$x[[i]], episode$column[[i]], returns[[i]], share)
-      }
-    },
-    learn_many = function(x, column, reward, episode, taken) {
-      cell <- store$cells(x, column)
-      returns <- sum_backwards(reward, discount, ends_of(episode))
-      if (first_only) {
-        counted <- !duplicated(cell + length(visited) * (episode - 1))
-        cell <- cell[counted]
-        returns <- returns[counted]
-      }
-      if (is.null(rate)) {
-        sums <- rowsum(cbind(returns, 1), cell)
-        own <- as.double(rownames(sums))
-        visited[own] <<- visited[own] + sums[, 2L]
-        before <- store$get()[own]
-        store$add(own, (sums[, 1L] - sums[, 2L] * before) / visited[own])
-      } else {
-        share <- rate(taken)
-        for (i in seq_along(cell)) {
-          store$add(cell[[i]], share * (returns[[i]] - store$get()[[cell[[i]]]]))
-        }
-        visited[] <<- visited + tabulate(cell, length(visited))
       }
     },
     visited = function() visited

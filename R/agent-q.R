@@ -97,11 +97,11 @@ agent_start.gym_agent_q <- function(agent, policy) {
 }
 
 #' @exportS3Method
-learner_of.gym_agent_q <- function(agent) {
+learner_of.gym_agent_q <- function(agent, draw) {
   if (agent$double) {
-    return(double_steps(agent))
+    return(double_steps(agent, draw))
   }
-  learning <- learning_of(agent)
+  learning <- learning_of(agent, draw)
   row <- learning$store$row
   choose <- learning$choose
   toward <- learning$store$toward
@@ -116,7 +116,7 @@ learner_of.gym_agent_q <- function(agent) {
   own_row <- identical(agent$basis$each, 1L) && is.null(memory)
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) choose(row(x), taken),
+    act = function(x, sub_env, observation) choose(row(x), taken),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       values <- row(after)
       ahead <- if (terminated) 0 else max(values)
@@ -142,11 +142,10 @@ learner_of.gym_agent_q <- function(agent) {
 
 # A coin decides for each step which of the two tables learns from it. That table chooses the best
 # next action; the other one values it.
-double_steps <- function(agent) {
-  learning <- learning_of(agent)
+double_steps <- function(agent, draw) {
+  learning <- learning_of(agent, draw)
   first <- learning$store
   second <- value_store(agent$basis, agent$second, agent$initial, value_columns_of(agent))
-  draw <- learning$uniform$draw
   choose <- learning$choose
   rate <- rate_of(agent$learning_rate)
   discount <- agent$discount
@@ -158,7 +157,7 @@ double_steps <- function(agent) {
   }
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) choose(both(x), taken),
+    act = function(x, sub_env, observation) choose(both(x), taken),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       if (draw() < 0.5) {
         learn(first, second, x, column, reward, after, terminated)

@@ -50,8 +50,8 @@ check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {
 }
 
 #' @exportS3Method
-learner_of.gym_agent_sarsa <- function(agent) {
-  learning <- learning_of(agent)
+learner_of.gym_agent_sarsa <- function(agent, draw) {
+  learning <- learning_of(agent, draw)
   row <- learning$store$row
   choose <- learning$choose
   learn <- learning$learn
@@ -59,7 +59,7 @@ learner_of.gym_agent_sarsa <- function(agent) {
   expects <- agent$expected
   new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) choose(row(x), taken),
+    act = function(x, sub_env, observation) choose(row(x), taken),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       ahead <- 0
       following <- NA_integer_

@@ -78,20 +78,20 @@ agent_start.gym_agent_td <- function(agent, policy) {
 value_columns_of.gym_agent_td <- function(agent) 1L
 
 #' @exportS3Method
-learner_of.gym_agent_td <- function(agent) {
-  learning <- learning_of(agent)
+learner_of.gym_agent_td <- function(agent, draw) {
+  learning <- learning_of(agent, draw)
   value <- learning$store$row
   probabilities <- chooser_probabilities(
     agent$plays, agent$spaces$action_space, is.null(agent$features)
   )
-  act <- policy_chooser(agent, probabilities, learning$uniform$draw)
+  act <- policy_chooser(agent, probabilities, draw)
   ratio <- if (!is.null(agent$learns)) importance_ratio(agent)
   learn <- if (is.null(ratio)) learning$learn else weighted_lookahead(agent, learning$store)
   taken <- agent$taken
   from <- list()
-  steps <- new_steps(
+  new_steps(
     agent, learning,
-    begin = function(x, sub_env, observation) {
+    act = function(x, sub_env, observation) {
       if (!is.null(ratio)) from[[sub_env]] <<- observation
       act(x, sub_env, observation)
     },
@@ -106,13 +106,8 @@ learner_of.gym_agent_td <- function(agent) {
       taken <<- taken + 1
       if (ended) NA_integer_ else act(after, sub_env, observation)
     },
-    taken = function() taken,
-    act = if (is.null(probabilities)) {
-      function(observation, n) act_batch(agent$plays, observation, n, agent$spaces)
-    }
+    taken = function() taken, sees = !is.null(ratio) || is.null(probabilities)
   )
-  steps$sees <- !is.null(ratio)
-  steps
 }
 
 # How much more likely `policy` takes an action than the policy that plays: a function of an
@@ -155,12 +150,7 @@ policy_chooser <- function(agent, probabilities, draw) {
   if (is.null(probabilities)) {
     policy <- agent$plays
     first <- agent$spaces$action_space$start - 1L
-    function(x, sub_env, observation) {
-      if (is.null(observation)) {
-        return(NA_integer_)
-      }
-      act_batch(policy, observation, 1L, agent$spaces) - first
-    }
+    function(x, sub_env, observation) act_batch(policy, observation, 1L, agent$spaces) - first
   } else if (is.matrix(probabilities)) {
     function(x, sub_env, observation) draw_place(probabilities[x, ], draw())
   } else {

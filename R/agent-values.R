@@ -116,38 +116,29 @@ check_first_table <- function(agent, policy) {
 #' They are closures over plain numbers, for one step at a time. An element of a vector is changed
 #' in place; an agent that is passed from step to step would be copied.
 #' @return A list: `store`, see [value_store()]; `choose`, see [action_chooser()]; `learn`, see
-#'   [lookahead()]; `uniform`, the source of their random numbers, see [uniform_draws()].
+#'   [lookahead()].
 #' @noRd
-learning_of <- function(agent) {
-  uniform <- uniform_draws()
+learning_of <- function(agent, draw) {
   store <- value_store(agent$basis, agent$weights, agent$initial, value_columns_of(agent))
-  list(
-    uniform = uniform, store = store,
-    choose = action_chooser(agent, uniform$draw), learn = lookahead(agent, store)
-  )
+  list(store = store, choose = action_chooser(agent, draw), learn = lookahead(agent, store))
 }
 
 #' Make a learner from the functions of its steps
 #' @param learning As [learning_of()] makes it.
-#' @param begin,observe The learner's own, as [learner_of()] describes them.
+#' @param act,observe,sees The learner's own, as [learner_of()] describes them.
 #' @param taken A function that returns the number of steps so far.
 #' @param export A function that adds the learner's own elements to the agent.
-#' @param stores All its tables, in which masks are recorded.
+#' @param stores All its tables; the first one has the values of the actions.
 #' @noRd
-new_steps <- function(agent, learning, begin, observe, taken, export = identity,
-                      stores = list(learning$store), act = NULL, whole = NULL) {
+new_steps <- function(agent, learning, act, observe, taken, export = identity,
+                      stores = list(learning$store), sees = FALSE) {
   list(
-    begin = begin, observe = observe, act = act, whole = whole,
+    act = act, observe = observe, stores = stores, sees = sees,
     export = function() {
       agent["weights"] <- list(learning$store$get())
       agent$taken <- taken()
       export(agent)
-    },
-    forbid = function(x, forbidden) {
-      if (any(forbidden)) for (store in stores) store$forbid(x, forbidden)
-      learning$store$row(x)
-    },
-    renew = learning$uniform$renew, uniform = learning$uniform$draw
+    }
   )
 }
 

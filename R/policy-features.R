@@ -231,10 +231,11 @@ predict_policy.gym_policy_features <- function(policy, newdata, type, call = rla
   feature_values(policy, observed$batch, observed$n)
 }
 
-# A row for each observation. A user's function is not asked about none.
+# A row for each observation. A user's function is not asked about none, and before the first step
+# of training it has no weights, because its number of features is not known.
 feature_values <- function(policy, observation, n) {
-  if (n == 0L) {
-    return(policy$weights[0L, , drop = FALSE])
+  if (n == 0L || !nrow(policy$weights)) {
+    return(matrix(0, n, ncol(policy$weights)))
   }
   linear_values(policy$basis, policy$weights, policy$basis$of(observation, n))
 }

@@ -105,35 +105,29 @@ format.gym_policy_unknown <- function(x, ...) "the learner's own"
 #' @return A list: `agent`, updated, `returns` and `lengths` of the episodes.
 #' @noRd
 learn_episodes <- function(state, vector_env, settings, call) {
-  learner <- state$learner
-  if (is.null(learner)) {
-    learner <- state$learner <- learner_of(state$agent)
-  }
+  agent <- state$agent
+  state$uniform <- state$uniform %||% uniform_draws()
+  state$uniform$renew()
+  learner <- learner_of(agent, state$uniform$draw)
   if (is.null(learner)) {
     return(learn_by_methods(state, vector_env, settings, call))
   }
-  learner$renew()
-  if (learns_beside(state, vector_env, settings)) {
-    return(learn_beside(learner, state, vector_env, settings))
-  }
   vector_env <- stepped(vector_env)
-  if (!is.null(state$agent$mask)) {
-    note <- function(observation, mask) {
-      forbid_actions(learner, state$agent, observation, mask, call)
-    }
-    vector_env <- with_masks(vector_env, state$agent$mask, note, call)
+  if (!is.null(agent$mask)) {
+    note <- function(observation, mask) forbid_actions(learner, agent, observation, mask, call)
+    vector_env <- with_masks(vector_env, agent$mask, note, call)
   }
   played <- if (vector_env$num_envs == 1L) {
     if (is.null(settings$sampled) && plan_kind() != "none") inform_learner_plays_here()
     learn_alone(learner, state, vector_env, settings, call)
   } else {
-    playing <- side_by_side(learner, state$agent, call)
-    episode_results(play_iteration(state, vector_env, settings, learner = playing))
+    playing <- side_by_side(learner, agent, call)
+    episode_results(play_iteration(state, vector_env, settings, playing))
   }
   c(list(agent = learner$export()), played)
 }
 
-# Whether a learner learns between episodes, and they can be played with nothing but a policy.
+# Whether a learner can learn from whole episodes, as an agent that is told of iterations does.
 plays_whole <- function(agent) {
   inherits(agent, "gym_agent_monte_carlo") &&
     learns_whole(agent$mask, agent$exploring_starts, agent$importance)
@@ -144,26 +138,14 @@ learns_whole <- function(mask, exploring_starts, importance) {
   is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")
 }
 
-# Whether the server's processes play whole episodes for a learner; asked once per training.
-learns_beside <- function(state, vector_env, settings) {
-  state$beside <- state$beside %||% (plays_whole(state$agent) && plays_beside(
-    vector_env, agent_policy(state$agent), settings$max_steps %||% Inf, keep_steps = TRUE
+# Whether the agent learns during play in this training; asked once.
+learns_in_play <- function(state, vector_env, settings) {
+  state$in_play <- state$in_play %||% (learns_online(state$agent) && !(
+    plays_whole(state$agent) && plays_beside(
+      vector_env, agent_policy(state$agent), settings$max_steps %||% Inf, keep_steps = TRUE
+    )
   ))
-  state$beside
-}
-
-learn_beside <- function(learner, state, vector_env, settings) {
-  policy <- with_generator(state$streams$agent, learner$whole$policy())
-  history <- play_iteration(state, vector_env, settings, policy, keep_steps = TRUE)
-  steps <- steps_in_order(history$batches, episodes_table(history$batches), vector_env)
-  reward <- steps$reward
-  check_rewards(reward, NULL)
-  # All at once: the division of episodes into requests must not change the last bit of a sum.
-  learner$whole$learn(
-    state$agent$basis$of(steps$observation, length(reward))[, 1L],
-    action_columns(vector_env, steps$action), reward, steps$row
-  )
-  c(list(agent = learner$export()), episode_results(history))
+  state$in_play
 }
 
 # One sub-environment plays one episode after the other.
@@ -171,7 +153,7 @@ learn_alone <- function(learner, state, vector_env, settings, call) {
   check_has_end(vector_env, settings$max_steps %||% Inf)
   world <- state$world
   if (is.null(world) || !is.null(state$agent$mask)) {
-    world <- state$world <- world_of(vector_env, state$agent$basis, learner$uniform)
+    world <- state$world <- world_of(vector_env, state$agent$basis, state$uniform$draw)
   }
   seeds <- with_generator(state$streams$seeds, draw_training_seeds(settings$episodes))
   stream <- new_generator(stream = take_stream(state$streams))
@@ -193,16 +175,17 @@ learn_by_methods <- function(state, vector_env, settings, call) {
       check_is_agent(agent, "agent_observe()", call)
     }
   )
-  history <- play_iteration(state, vector_env, settings, learner = learner)
+  history <- play_iteration(state, vector_env, settings, learner)
   c(list(agent = agent), episode_results(history))
 }
 
 # The episodes of an iteration, in the same loop as rollouts.
-play_iteration <- function(state, vector_env, settings, policy = NULL, ...) {
+play_iteration <- function(state, vector_env, settings, learner) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
   play_batches(
-    vector_env, history, function(which) policy, ..., max_steps = settings$max_steps %||% Inf,
+    vector_env, history, function(which) NULL, learner = learner,
+    max_steps = settings$max_steps %||% Inf,
     report = function(ended) state$report(history$played_episodes + ended)
   )
   history

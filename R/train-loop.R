@@ -77,7 +77,7 @@ played_text <- function(settings, state) {
 }
 
 train_iteration <- function(state, vector_env, settings, call) {
-  if (learns_online(state$agent)) {
+  if (learns_in_play(state, vector_env, settings)) {
     results <- learn_episodes(state, vector_env, settings, call)
     return(enter_iteration(state, settings, results$agent, results, results$lengths))
   }
@@ -115,7 +115,8 @@ train_iteration <- function(state, vector_env, settings, call) {
 # What plays an iteration: candidates, networks with the weights that the agent asks for; or the
 # behavior policy itself if it has no weights.
 asked_candidates <- function(state, agent, call) {
-  policy <- agent_behavior(agent)
+  # A behavior policy may be drawn.
+  policy <- with_generator(state$streams$agent, agent_behavior(agent))
   if (!inherits(policy, "gym_policy_network")) {
     return(list(candidates = policy))
   }

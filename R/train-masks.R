@@ -119,7 +119,8 @@ forbid_actions <- function(learner, agent, observation, mask, call) {
   row <- agent$basis$of(observation, nrow(mask))[, 1L]
   for (i in seq_along(row)) {
     forbidden <- !mask[i, ]
-    if (all(learner$forbid(row[[i]], forbidden) == -Inf)) {
+    for (store in learner$stores) store$forbid(row[[i]], forbidden)
+    if (all(learner$stores[[1L]]$row(row[[i]]) == -Inf)) {
       gym_abort(
         paste0("The info's `", agent$mask, "` forbids every action at the observation ",
                describe_value(batch_value(agent$spaces$observation_space, observation, i)), "."),

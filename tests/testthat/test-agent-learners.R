@@ -25,10 +25,12 @@ started <- function(agent, table = q) {
   agent_start(agent, policy)
 }
 
+learner <- function(agent) learner_of(agent, function() stats::runif(1L))
+
 # The agent after some steps. Its learner goes on with it; `chosen` are the actions that it does
 # next.
 observe <- function(agent, steps) {
-  learner <- attr(agent, "learner") %||% learner_of(agent)
+  learner <- attr(agent, "learner") %||% learner(agent)
   basis <- agent$basis
   chosen <- vapply(seq_along(steps$reward), function(i) {
     terminated <- steps$terminated[[i]]
@@ -43,9 +45,9 @@ observe <- function(agent, steps) {
 
 # What it does first in an episode, so many times.
 begins <- function(agent, state, times = 1) {
-  learner <- attr(agent, "learner") %||% learner_of(agent)
+  learner <- attr(agent, "learner") %||% learner(agent)
   x <- agent$basis$one(state)
-  vapply(seq_len(times), function(i) as.integer(learner$begin(x, 1L, state)) - 1L, 0L)
+  vapply(seq_len(times), function(i) as.integer(learner$act(x, 1L, state)) - 1L, 0L)
 }
 
 test_that("Q-learning moves a value towards the reward and the best value that follows", {
@@ -173,23 +175,24 @@ test_that("Monte Carlo learns the same from many episodes at once as from one af
   reward <- round(stats::rnorm(100), 1)
   for (how in list(list(), list(visits = "every"), list(learning_rate = 0.1, discount = 1))) {
     agent <- started(do.call(agent_monte_carlo, how))
-    at_once <- learner_of(agent)
-    at_once$whole$learn(x, column, reward, episode)
-    in_turn <- learner_of(agent)
+    at_once <- agent_tell(agent, list(trajectories = list(
+      observation = x - 1L, action = column - 1L, reward = reward, episode = episode
+    )))
+    in_turn <- learner(agent)
     for (i in 1:100) {
       in_turn$observe(x[[i]], column[[i]], reward[[i]], 1L, FALSE, i %% 5 == 0, 1L, NULL)
     }
-    expect_equal(at_once$export(), in_turn$export())
+    expect_equal(at_once, in_turn$export())
   }
 })
 
 test_that("the policy of an iteration takes one of the actions with equal values, and no other", {
   agent <- started(agent_monte_carlo(epsilon = 0.3), rbind(c(1, 1), c(3, 5), c(-Inf, 2)))
   set.seed(1)
-  drawn <- replicate(50, learner_of(agent)$whole$policy()$q, simplify = FALSE)
+  drawn <- replicate(50, agent_behavior(agent)$q, simplify = FALSE)
   expect_setequal(lapply(drawn, function(q) q[1, ]), list(0:1 + 0, 1:0 + 0))
   expect_identical(unique(lapply(drawn, function(q) q[2:3, ])), list(rbind(0:1 + 0, c(-Inf, 1))))
-  expect_identical(learner_of(agent)$whole$policy()$epsilon, 0.3)
+  expect_identical(agent_behavior(agent)$epsilon, 0.3)
 })
 
 test_that("exploring starts draw the first action of an episode, and only that", {
@@ -250,11 +253,9 @@ test_that("off-policy Monte Carlo weighs returns by what the policy would have d
   sticks <- policy_table(cbind(rep(0, 3), 1))
   episode <- function(how) {
     agent <- agent_monte_carlo(discount = 1, epsilon = 1, importance = how, target_policy = sticks)
-    learner <- learner_of(started(agent, 0 * q))
+    learner <- learner(started(agent, 0 * q))
     play <- function(actions, rewards) {
-      # What is drawn is put in the place of what the test does.
-      withr::with_seed(1, learner$renew())
-      column <- learner$begin(1L, 1L, NULL)
+      column <- learner$act(1L, 1L, NULL)
       for (i in seq_along(rewards)) {
         last <- i == length(rewards)
         following <- learner$observe(i, column, rewards[[i]], i + 1L, last, last, 1L, NULL)
@@ -286,8 +287,8 @@ test_that("off-policy TD moves a value as far as the policy is more likely to ac
   often <- policy_table(cbind(rep(log(3), 3), 0), temperature = 1)
   agent <- agent_td(policy_table(cbind(rep(0, 3), 1)), discount = 0.5, learning_rate = 0.1,
                     initial = 2, behavior = often)
-  learner <- learner_of(agent_start(agent, spaces()))
-  column <- learner$begin(1L, 1L, 0L)
+  learner <- learner(agent_start(agent, spaces()))
+  column <- learner$act(1L, 1L, 0L)
   learner$observe(1L, 2L, 10, 2L, FALSE, FALSE, 1L, 1L)
   # Probabilities of 1 and 1/4.
   once <- 2 + 4 * 0.1 * (10 + 0.5 * 2 - 2)
@@ -303,7 +304,7 @@ test_that("an actor moves towards what came to more than its critic had expected
     agent_actor_critic(discount = 0.5, learning_rate = 0.1, actor_rate = 0.2, lambda = 0.8,
                        actor_lambda = 0.4), spaces()
   )
-  learner <- learner_of(agent)
+  learner <- learner(agent)
   learner$observe(1L, 2L, 10, 2L, FALSE, FALSE, 1L, NULL)
   one <- learner$export()
   expect_equal(one$weights[, 1], c(1, 0, 0))
@@ -322,7 +323,7 @@ test_that("a step without a choice, or without features, leaves no trace and no 
   policy <- spaces(states = 2)
   policy$possible <- rbind(c(TRUE, FALSE), c(TRUE, TRUE))
   agent <- agent_start(agent_actor_critic(lambda = 0.8, actor_lambda = 0.4), policy)
-  learner <- learner_of(agent)
+  learner <- learner(agent)
   expect_silent(learner$observe(1L, 1L, 10, 2L, FALSE, FALSE, 1L, NULL))
   one <- learner$export()
   expect_equal(one$preferences, rbind(c(0, -Inf), c(0, 0)))

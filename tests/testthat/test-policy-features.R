@@ -65,11 +65,20 @@ test_that("a learner with tiles learns a value for each place", {
     agent_q(discount = 1, learning_rate = 0.5, features = tile_coding(4, 4)),
     list(observation_space = box_space(c(0, 0), c(1, 1)), action_space = space_discrete(2))
   )
-  learner <- learner_of(agent)
+  learner <- learner_of(agent, stats::runif)
   x <- agent$basis$one(c(0.2, 0.2))
   learner$observe(x, 2L, 8, agent$basis$one(c(0.9, 0.9)), TRUE, TRUE, 1L, NULL)
   agent <- learner$export()
   value <- function(at) predict(agent_policy(agent), at, type = "output")[, 2]
   expect_equal(value(rbind(c(0.2, 0.2), c(0.9, 0.9))), c(4, 0))
   expect_identical(act(agent_policy(agent), c(0.2, 0.2)), 1L)
+})
+
+test_that("features of a user's own function can be evaluated before the first step", {
+  agent <- agent_start(
+    agent_q(features = function(observation) cbind(1, observation)),
+    list(observation_space = box_space(c(0, 0), c(1, 1)), action_space = space_discrete(2))
+  )
+  policy <- agent_policy(agent)
+  expect_identical(predict(policy, rbind(c(0.1, 0.2), c(0.3, 0.4))), c(0L, 0L))
 })
