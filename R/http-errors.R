@@ -6,6 +6,7 @@ abort_http <- function(response, method, call) {
     list(message = "message", code = "code", hint = "hint", extra = "extra"),
     function(name) shown_text(string_or_null(response$answer[[name]]))
   )
+  if (identical(problem$code, "unknown_instance")) check_not_restarted(response$url, call)
   request <- paste(method, response$url)
   status_text <- tryCatch(httr::http_status(status)$reason, error = function(cnd) "")
   hint <- extra_hint(problem$extra, response$url) %||% token_hint(problem$code) %||%

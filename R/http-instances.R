@@ -50,7 +50,7 @@ create_once <- function(client, state, fields, call) {
     state$server <- string_or_null(answer$server)
     remember_instance(
       instance_place(client, answer$instance_id), client, answer$instance_id,
-      env_id = shown_line(answer$env_id)
+      env_id = shown_line(answer$env_id), server = state$server
     )
     outcome <- "created"
   })
@@ -77,12 +77,14 @@ end_creation <- function(state, place, outcome) {
 # its idempotency key.
 instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
 
-# `body` is that of a creation that has no answer yet.
-remember_instance <- function(place, client, instance_id = NULL, body = NULL, env_id = NULL) {
+# `body` is that of a creation that has no answer yet, and `server` the text by which the server
+# says which one it is.
+remember_instance <- function(place, client, instance_id = NULL, body = NULL, env_id = NULL,
+                              server = NULL) {
   assign(
     place,
     list(client = client, pid = Sys.getpid(), instance_id = instance_id, body = body,
-         env_id = env_id),
+         env_id = env_id, server = server),
     envir = the_session$instances
   )
 }
@@ -106,11 +108,14 @@ forget_instances_of <- function(base) {
   rm(list = places_on(base), envir = the_session$instances)
 }
 
-# The environments of this session on a server, for a message; `NULL` if there are none.
-environments_on <- function(base) {
-  names <- vapply(mget(places_on(base), the_session$instances), function(entry) {
-    paste0(entry$env_id, " (", entry$instance_id, ")")
-  }, "")
+# The environments of this session at an address, or of one server there, for a message; `NULL` if
+# there are none.
+environments_on <- function(base, server = NULL) {
+  entries <- mget(places_on(base), the_session$instances)
+  if (!is.null(server)) {
+    entries <- Filter(function(entry) identical(entry$server, server), entries)
+  }
+  names <- vapply(entries, function(entry) paste0(entry$env_id, " (", entry$instance_id, ")"), "")
   if (length(names)) few_names(unname(names))
 }
 
@@ -122,6 +127,30 @@ end_bullets <- function(base) {
     x = if (!is.null(server)) server$why_ended(),
     i = if (!is.null(lost)) paste0("Lost with it: ", lost, ".")
   )
+}
+
+# Raises the error for an instance that ended with its server, if the server at the address does not
+# know it because it was started later, as by the front of `gym_server_start(users = )`.
+check_not_restarted <- function(url, call) {
+  entry <- the_session$instances[[sub("^(.*)/v1/envs/([^/]*)/.*$", "\\1 \\2", url)]]
+  if (is.null(entry$server)) {
+    return(invisible())
+  }
+  # Without an answer the refusal stays as it is.
+  server <- tryCatch(
+    get_answer(entry$client, "/v1/health/")$server, gym_error = function(cnd) entry$server
+  )
+  if (!identical(server, entry$server)) {
+    base <- entry$client$remote_base
+    gym_abort(
+      c(
+        paste0("The server at ", base, " has ended, and was started anew."),
+        i = paste0("Lost with it: ", environments_on(base, entry$server), "."),
+        i = "Make them again with `gym_make()`."
+      ),
+      class = "gym_error_connection", url = base, reached = TRUE, call = call
+    )
+  }
 }
 
 # Closing --------------------------------------------------------------------------

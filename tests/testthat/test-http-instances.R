@@ -216,3 +216,25 @@ test_that("a client goes on with a server that was started later at its address"
   expect_error(perform_request(request, key = key), class = "gym_error_http_410")
   expect_named(env_list_all(later), id)
 })
+
+test_that("a server that the front started anew is said to have lost the session's environments", {
+  skip_unless_all()
+  server <- local_users_server()
+  anna <- create_GymClient(server$remote_base, token = user_tokens[["anna"]])
+  ids <- replicate(2, env_create(anna, "CartPole-v1"))
+  env <- gym_make("Acrobot-v1", client = anna)
+  env$reset()
+  expect_error(env_step(anna, "abcdef01", 0), "unknown", class = "gym_error_http_400")
+  tools::pskill(get_answer(anna, "/v1/health/")$pid, tools::SIGKILL)
+  calls <- list(
+    function() env$step(1), function() env$render(), function() env_reset(anna, ids[[1]])
+  )
+  for (call in calls) {
+    cnd <- expect_error(call(), "was started anew", class = "gym_error_connection")
+    for (id in c(env$instance_id, ids)) expect_match(conditionMessage(cnd), id, fixed = TRUE)
+  }
+  # What is made on the new server is not lost.
+  new <- env_create(anna, "CartPole-v1")
+  cnd <- expect_error(env$step(1), class = "gym_error_connection")
+  expect_no_match(conditionMessage(cnd), new, fixed = TRUE)
+})
