@@ -29,10 +29,9 @@ class ActionReader:
             num_envs: the number of sub-environments; None for a single environment.
         """
         self._space = space
-        self._wide = wide = spaces.with_wide_boxes(space)
         self._all = spaces.Rows(num_envs, f"the {num_envs} sub-environments")
-        self._of_json = spaces.json_reader(wide)
-        self._of_tensors = spaces.tensor_reader(wide, "action")
+        self._of_json = spaces.json_reader(space)
+        self._of_tensors = spaces.tensor_reader(space, "action")
 
     def read(self, action: object, rows: int | None = None) -> object:
         """Decode an action, or with sub-environments a batch of actions.
@@ -50,7 +49,7 @@ class ActionReader:
                 return self._of_tensors(action, whose)
             if whose.number is None:
                 return self._of_json(action)
-            return spaces.decode_sub_envs(self._wide, action, whose)
+            return spaces.decode_sub_envs(self._space, action, whose)
         except spaces.NotInSpace as refusal:
             raise GymServerError(
                 "action_not_in_space", f"The action {refusal}", _possible_actions(self._space)

@@ -316,9 +316,12 @@ class Instance(Watchable):
 
         With sub-environments, the claim's value has an entry for each.
         """
-        space: Space = getattr(self, f"single_{name}")
+        single: Space = getattr(self, f"single_{name}")
         return spaces.contains(
-            claim, lambda value: self._decode(space, value), lambda: self.space_info(name)
+            getattr(self.gym_env, name),
+            claim,
+            lambda value: self._decode(single, value),
+            lambda: self.space_info(name),
         )
 
     def _decode(self, space: Space, value: object) -> object:

@@ -42,7 +42,6 @@ from gym_server.spaces.tensor_parts import (
     tensor_writer,
     travels_as_tensors,
 )
-from gym_server.spaces.wide_boxes import with_wide_boxes
 
 __all__ = [
     "NotInSpace",
@@ -64,5 +63,4 @@ __all__ = [
     "tensor_shapes",
     "tensor_writer",
     "travels_as_tensors",
-    "with_wide_boxes",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, singledispatch
+from functools import cache, singledispatch
 from typing import Any, Protocol
 
 import numpy as np
@@ -93,35 +93,25 @@ def choice_reader_of(dtype: np.dtype) -> Callable[[object], object]:
 class Bounds:
     """The smallest and the largest member, element by element."""
 
-    low: np.ndarray | int
-    high: np.ndarray | int
+    low: Any
+    high: Any
 
-    @cached_property
-    def _same_for_all(self) -> tuple[Any, Any] | None:
-        """The bounds as two numbers, if all elements have the same bounds."""
-        # Subclasses of ndarray may compare differently.
-        if not {type(self.low), type(self.high)} <= {np.ndarray, int}:
-            return None
-        low, high = np.asarray(self.low), np.asarray(self.high)
-        if not low.size or low.min() != low.max() or high.min() != high.max():
-            return None
-        return low.flat[0].item(), high.flat[0].item()
+    def inside(self, array: np.ndarray) -> np.ndarray:
+        """Return which elements are within the bounds; NaN is not."""
+        within: np.ndarray = (array >= self.low) & (array <= self.high)
+        return within
 
     def hold(self, array: np.ndarray) -> bool:
-        """Return whether all elements are within the bounds; NaN is not."""
-        same = self._same_for_all
-        if same is None or not array.size:
-            inside = (array >= self.low) & (array <= self.high)
-            return bool(inside.all())
-        low, high = same
-        # Two passes, without a temporary array.
-        least, most = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
-        return bool(least >= low and most <= high)
+        """Return whether all elements are within the bounds."""
+        if isinstance(self.low, int) and array.size:
+            # Two passes, without a temporary array.
+            least, most = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
+            return bool(least >= self.low and most <= self.high)
+        return bool(np.logical_and.reduce(self.inside(array), axis=None))
 
     def refusal(self, space: object, array: np.ndarray) -> NotInSpace:
         """Return the error, with the index, for the first element outside the bounds, or NaN."""
-        inside = (array >= self.low) & (array <= self.high)
-        first = tuple(int(index) for index in np.argwhere(~inside)[0])
+        first = tuple(int(index) for index in np.argwhere(~self.inside(array))[0])
         refusal = NotInSpace(space, array[first].item())
         refusal.path[:] = first
         return refusal

@@ -34,9 +34,27 @@ def _(space: Box, value: object) -> object:
     return np.asarray(value).tolist()
 
 
+class _BoxBounds(Bounds):
+    """Bounds that every finite number is within.
+
+    Gymnasium does not check the bounds of a Box in ``step()``. The environment decides what an
+    action outside of them does; most environments clip it.
+    """
+
+    def inside(self, array: np.ndarray) -> np.ndarray:
+        """Return which elements may be in an action; NaN may not, an infinity if it is a bound."""
+        within: np.ndarray = np.isfinite(array) | super().inside(array)
+        return within
+
+    def hold(self, array: np.ndarray) -> bool:
+        """Return whether all elements may be in an action."""
+        is_finite = bool(np.logical_and.reduce(np.isfinite(array), axis=None))
+        return is_finite or super().hold(array)
+
+
 @bounds_of.register
 def _(space: Box) -> Bounds:
-    return Bounds(space.low, space.high)
+    return _BoxBounds(space.low, space.high)
 
 
 @decode.register

@@ -75,6 +75,8 @@ def encode_members(space: Any, batch: Any) -> list:
 def decode(space: Space, value: object) -> object:
     """Decode a JSON value to a member of a space, in the space's dtype.
 
+    Numbers of a Box may be outside of its bounds, see ``box.py``.
+
     Raises:
         NotInSpace: the value does not represent a member.
     """

@@ -6,27 +6,35 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from gymnasium.spaces import Space
+
 from gym_server.spaces.arrays import is_number
 from gym_server.spaces.kinds import NotInSpace
 
 
-def contains(claim: dict, decode: Callable[[object], object], describe: Callable[[], dict]) -> bool:
+def contains(
+    space: Space,
+    claim: dict,
+    decode: Callable[[object], object],
+    describe: Callable[[], dict],
+) -> bool:
     """Answer a client's "contains" question.
 
     Args:
+        space: the space.
         claim: ``{"value": ...}`` asks whether a JSON value represents a member. Anything else is a
             classic client's description, such as ``{"name": "Box", "shape": [4]}``, and asks
             whether all of it matches the space.
-        decode: returns the member that a JSON value represents, or raises ``NotInSpace``.
+        decode: returns what a JSON value represents, or raises ``NotInSpace``.
         describe: returns the space's description.
     """
     if "value" not in claim:
         return _describes(claim, describe())
     try:
-        decode(claim["value"])
+        # What was decoded may be outside the bounds of a Box.
+        return bool(space.contains(decode(claim["value"])))
     except NotInSpace:
         return False
-    return True
 
 
 def _describes(claim: dict, space_info: dict) -> bool:

@@ -8,7 +8,7 @@ from gymnasium.spaces import MultiBinary
 from gym_server.spaces.arrays import Bounds, bounds_of, read_array, read_bit
 from gym_server.spaces.kinds import decode, description, encode
 
-_BITS = Bounds(np.int8(0), np.int8(1))
+_BITS = Bounds(0, 1)
 
 
 @description.register

@@ -51,8 +51,6 @@ def test_a_box_without_dimensions_takes_a_number():
         [],
         [[0.5, 0.5]],
         [[[0.5]]],
-        2.1,
-        -2.1,
         [True],
         True,
         "0.5",
@@ -121,11 +119,11 @@ def test_encoding_keeps_every_digit():
 
 def test_the_element_that_does_not_fit_is_named_with_its_place():
     space = Box(-1, 1, (2, 3), np.float32)
-    assert refused(space, [[0, 0, 0], [0, 5, 0]]).startswith("5.0 at [1][1] is not in Box(")
+    assert refused(space, [[0, 0, 0], [0, "NaN", 0]]).startswith('"NaN" at [1][1] is not in Box(')
     assert refused(space, [[0, 0, 0], [0, "x", 0]]).startswith('"x" at [1][1] is not in Box(')
-    assert refused(space, [0, 0, 0, 0, 5, 0]).startswith("5.0 at [4] is not in Box(")
+    assert refused(space, [0, 0, 0, 0, "NaN", 0]).startswith('"NaN" at [4] is not in Box(')
     assert refused(space, [[0, 0, 0], [0, 1e39, 0]]).startswith("1e+39 at [1][1] is not in Box(")
-    assert refused(PENDULUM, 3).startswith("3.0 is not in Box(")
+    assert refused(PENDULUM, "NaN").startswith('"NaN" is not in Box(')
 
 
 @pytest.mark.parametrize("shape", [(0,), (2, 0), (0, 2)])

@@ -43,7 +43,7 @@ def test_there_may_be_no_nodes():
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (but(nodes=[[0, 1], [0, 2]]), "2.0 at $nodes[1][1] is not in Box"),
+        (but(nodes=[[0, 1], [0, "x"]]), '"x" at $nodes[1][1] is not in Box'),
         (but(edges=[2, 3]), "3 at $edges[1] is not in Discrete(3)"),
         (but(edge_links=[[0, 1], [1, 2]]), "2 at $edge_links[1][1] is not in Graph"),
         (but(edge_links=[[0, 1], [1, -1]]), "-1 at $edge_links[1][1] is not in Graph"),

@@ -43,8 +43,8 @@ def test_a_refusal_names_space_and_value_briefly():
     ],
 )
 def test_a_refusal_names_the_path_as_r_writes_it(key, path):
-    words = refused(Dict({key: Box(-1, 1, (3,))}), {key: [0, 0, 7]})
-    assert words == f"7.0 at {path} is not in Box(-1.0, 1.0, (3,), float32)"
+    words = refused(Dict({key: Box(-1, 1, (3,))}), {key: [0, 0, "x"]})
+    assert words == f'"x" at {path} is not in Box(-1.0, 1.0, (3,), float32)'
 
 
 def test_a_path_leads_through_every_kind_of_nesting():

@@ -9,7 +9,9 @@ PENDULUM = Box(-2.0, 2.0, (1,), np.float32)
 
 
 def contains(space, claim):
-    return spaces.contains(claim, lambda value: decode(space, value), lambda: describe(space))
+    return spaces.contains(
+        space, claim, lambda value: decode(space, value), lambda: describe(space)
+    )
 
 
 @pytest.mark.parametrize(

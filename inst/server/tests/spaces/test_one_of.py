@@ -29,5 +29,5 @@ def test_what_is_no_pair_is_refused(value):
 
 
 def test_a_wrong_member_is_named_by_its_place():
-    assert refused(SPACE, [1, [0.5, 3]]).startswith("3.0 at [1][1] is not in Box(")
+    assert refused(SPACE, [1, [0.5, "x"]]).startswith('"x" at [1][1] is not in Box(')
     assert refused(SPACE, [0, 2]) == "2 at [1] is not in Discrete(2)"
