@@ -14,10 +14,10 @@
 #' some 1000 further steps. The starting states, next states, rewards and ends must be possible by
 #' the model.
 #'
-#' @param env The environment: made by [gym_env()], [gym_make()] or a class that inherits from
-#'   [GymEnv]; any list or environment with functions `reset(seed)` and `step(action)`; or an id
-#'   such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]). The check resets and steps it. An
-#'   environment given by its id is made and closed.
+#' @param env The environment: made by [gym_env()] or [gym_make()]; any list or environment with
+#'   functions `reset(seed)` and `step(action)`; or an id such as `"CartPole-v1"` (with wrappers,
+#'   see [gym_wrap()]). The check resets and steps it. An environment given by its id is made and
+#'   closed.
 #' @param ... Arguments of the environment, by name, if it is given by its id.
 #' @param max_steps The number of steps after which an episode counts as endless, a whole number,
 #'   1000 by default. A higher limit of the environment itself replaces it.

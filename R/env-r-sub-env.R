@@ -113,3 +113,143 @@ abort_raised <- function(cnd, sub_env, sub_env_number, call,
     env_id = id, step = step, sub_env = sub_env_number, call = call, parent = cnd
   )
 }
+
+# Traits ---------------------------------------------------------------------------------
+
+# The constant part of an environment written in R: its spaces and its spec, and the checks of every
+# step, which are prepared once.
+
+#' Describe an environment written in R
+#'
+#' @return A list: `observation_space`, `action_space`, `spec`; `limit`, the number of steps after
+#'   which an episode is cut off, `Inf` for never; `observation_rules`, the observation space, whose
+#'   bounds allow a rounding; `action_rules`, the action space without the bounds of its Boxes,
+#'   because a Box action outside its bounds is passed to the environment as in Gymnasium;
+#'   `fits_observations` and `fits_actions`, fast checks of batches.
+#' @noRd
+new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
+                       reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
+  check_space(observation_space, call = call)
+  check_space(action_space, call = call)
+  check_string(id, call = call)
+  check_count(max_episode_steps, allow_null = TRUE, call = call)
+  check_number(reward_threshold, allow_null = TRUE, call = call)
+  check_number(render_fps, min = 0.1, allow_null = TRUE, call = call)
+  observation_rules <- allow_rounding(observation_space)
+  action_rules <- loosen_boxes(action_space)
+  list(
+    observation_space = observation_space,
+    action_space = action_space,
+    spec = list(
+      id = id, reward_threshold = reward_threshold,
+      max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps),
+      render_fps = render_fps
+    ),
+    limit = max_episode_steps %||% Inf,
+    observation_rules = observation_rules,
+    action_rules = action_rules,
+    fits_observations = quick_check(observation_rules),
+    fits_actions = quick_check(action_rules)
+  )
+}
+
+# The same environment with another id or limit: `changes` are elements of its spec.
+change_traits <- function(traits, changes) {
+  traits$spec[names(changes)] <- changes
+  traits$limit <- traits$spec$max_episode_steps %||% Inf
+  traits
+}
+
+change_spaces <- function(traits, observation_space = traits$observation_space,
+                          action_space = traits$action_space, call = NULL) {
+  changed <- new_traits(observation_space, action_space, traits$spec$id, call = call)
+  parts <- c("observation_space", "action_space", "observation_rules", "action_rules",
+             "fits_observations", "fits_actions")
+  traits[parts] <- changed[parts]
+  traits
+}
+
+loosen_boxes <- function(space) {
+  if (inherits(space, "gym_space_box")) {
+    space$low <- ifelse(is.finite(space$low), -.Machine$double.xmax, space$low)
+    space$high <- ifelse(is.finite(space$high), .Machine$double.xmax, space$high)
+  } else if (has_parts(space)) {
+    space$spaces <- lapply(space$spaces, loosen_boxes)
+  }
+  space
+}
+
+# Actions and observations ------------------------------------------------------------
+
+#' Check actions and give them the form that the user's functions get
+#' @param which The numbers of the sub-environments that take them, `NULL` for a single action.
+#' @noRd
+checked_action <- function(traits, action, which, call) {
+  rules <- traits$action_rules
+  if (!is.null(attributes(action)) || is.list(action)) {
+    action <- action_by_name(traits$action_space, action, traits$spec$id, call)
+  }
+  n <- if (!is.null(which)) length(which)
+  if (!fits_quickly(rules, action, n, traits$fits_actions)) {
+    check_one_or_batch(rules, action, n, call, which)
+  }
+  if (is.null(n)) {
+    tidy_value(traits$action_space, action, NULL)
+  } else {
+    tidy_actions(traits$action_space, action)
+  }
+}
+
+#' Convert a value to the form of a server's values
+#'
+#' Whole numbers become integers, the parts of a Dict get the order of the space, and numbers get
+#' the names of the space, if it has any.
+#' @param n The number of values in a batch; `NULL` for a single value.
+#' @noRd
+tidy_value <- function(space, value, n) {
+  if (inherits(space, "gym_space_discrete")) {
+    return(narrow_if_double(value))
+  }
+  if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
+    if (is.null(n)) {
+      dim(value) <- NULL
+      names(value) <- space$names
+    } else {
+      if (is.null(dim(value))) dim(value) <- c(length(value), 1L)
+      columns <- if (!is.null(space$names)) list(NULL, space$names)
+      if (!identical(dimnames(value), columns)) dimnames(value) <- columns
+    }
+  } else if (has_parts(space)) {
+    value <- map_parts(space, tidy_value, in_order(space, value), list(n))
+    if (!is.null(space$names)) names(value) <- space$names
+  }
+  value
+}
+
+narrow_if_double <- function(x) {
+  if (is.object(x) || is.integer(x)) unname(x) else narrow_whole(x)
+}
+
+#' Make a function that takes one action from a checked batch
+#' @noRd
+action_picker <- function(space) {
+  if (inherits(space, "gym_space_discrete")) {
+    function(batch, i) batch[[i]]
+  } else if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
+    function(batch, i) if (is.null(dim(batch))) batch[[i]] else batch[i, ]
+  } else {
+    function(batch, i) batch_value(space, batch, i)
+  }
+}
+
+# TRUE counts as 1 for Discrete actions.
+tidy_actions <- function(space, action) {
+  if (inherits(space, "gym_space_discrete")) {
+    narrow_if_double(action)
+  } else {
+    if (is.array(action) && !is.null(dimnames(action))) {
+      dimnames(action) <- NULL
+    }
+    action
+  }
+}

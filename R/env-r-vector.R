@@ -14,42 +14,25 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   r_vector_env(x, num_envs, max_envs, frames)
 }
 
-#' Play an environment in R in copies of it
-#' @param another A function that makes another sub-environment for an object of a class; `NULL` if
-#'   that is impossible: then there is only this one.
-#' @noRd
-r_vector_env <- function(env, num_envs, max_envs, frames, another = NULL,
-                         call = rlang::caller_env()) {
-  sub_env <- sub_env_of(env)
+# Plays an environment in R in copies of it.
+r_vector_env <- function(env, num_envs, max_envs, frames, call = rlang::caller_env()) {
   definition <- definition_of(env)
-  if (frames) check_renders(sub_env, call)
-  if (isTRUE(definition$vectorized)) {
-    num_envs <- if (frames) 1L else as.integer(num_envs %||% vectorized_sub_envs)
-    return(vectorized_vector_env(definition, num_envs, frames))
+  if (frames) {
+    check_renders(sub_env_of(env), call)
+    num_envs <- 1L
   }
-  if (is.null(definition) && is.null(another)) {
-    check_only_one(num_envs, sub_env, call)
-    return(scalar_vector_env(list(sub_env), 1L, frames))
+  if (definition$vectorized) {
+    return(vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames))
   }
-  if (frames || length(remembering(sub_env$traits$spec$wrappers))) num_envs <- 1L
   n <- num_envs %||% min(r_sub_envs, max_envs)
-  sub_envs <- if (is.null(definition)) {
-    c(list(sub_env), lapply(seq_len(n - 1), function(i) another()))
+  if (n == 1L) {
+    alone <- r_env$new(definition)
+    sub_envs <- list(sub_env_of(alone))
   } else {
-    lapply(seq_len(n), function(i) definition_sub_env(definition))
+    alone <- NULL
+    sub_envs <- lapply(seq_len(n), function(i) definition_sub_env(definition))
   }
-  scalar_vector_env(sub_envs, episodes_of_batch(num_envs %||% r_sub_envs), frames)
-}
-
-check_only_one <- function(num_envs, sub_env, call) {
-  if (isTRUE(num_envs > 1)) {
-    gym_abort(
-      c(paste0("`num_envs = ", num_envs, "` takes as many environments, and this ",
-               sub_env$traits$spec$id, " is one."),
-        i = "`gym_register()` its class, and name the environment by its id."),
-      class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
-    )
-  }
+  scalar_vector_env(sub_envs, episodes_of_batch(num_envs %||% r_sub_envs), frames, alone)
 }
 
 new_r_vector_env <- function(traits, ..., frames, sub_env) {
@@ -57,8 +40,7 @@ new_r_vector_env <- function(traits, ..., frames, sub_env) {
     list(
       observation_space = traits$observation_space, action_space = traits$action_space,
       spec = traits$spec, ...,
-      frame = if (frames) function() sub_env_png(sub_env),
-      remembers = remembering(traits$spec$wrappers), client = NULL,
+      frame = if (frames) function() sub_env_png(sub_env), remembers = character(), client = NULL,
       close = function(wait = TRUE) invisible()
     ),
     class = "gym_vector_env"
@@ -70,19 +52,19 @@ new_r_vector_env <- function(traits, ..., frames, sub_env) {
 #' Play several sub-environments together
 #'
 #' @param sub_envs A list of them, all with the same traits.
+#' @param alone The environment of the only one, or `NULL`.
 #' @noRd
-scalar_vector_env <- function(sub_envs, batch_size, frames = FALSE) {
+scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
   traits <- sub_envs[[1L]]$traits
-  alone <- length(sub_envs) == 1L
   all <- seq_along(sub_envs)
   number <- function(i) if (length(sub_envs) > 1L) i
   pick <- action_picker(traits$action_space)
   stack <- result_stacker(traits)
   new_r_vector_env(
     traits, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
-    env = if (alone) checked_methods(sub_envs[[1L]]),
-    step_one = if (alone) single_stepper(sub_envs[[1L]]),
-    guard = if (alone) single_guard(sub_envs[[1L]]),
+    env = alone,
+    step_one = if (!is.null(alone)) single_stepper(sub_envs[[1L]]),
+    guard = if (!is.null(alone)) single_guard(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
       call <- rlang::current_env()
       which <- which %||% all

@@ -1,8 +1,7 @@
 #' Make an environment from R functions
 #'
 #' Make an environment that works like those of [gym_make()] from two functions: one that starts an
-#' episode, and one that takes a step. It does not need a server. To write a class of environments,
-#' as in Gymnasium, use [GymEnv].
+#' episode, and one that takes a step. It does not need a server.
 #'
 #' The functions keep their state in `self`, an R environment: `self$position <- 0`. Each
 #' sub-environment has its own `self`, so [rollout()] and every search can play many of them
@@ -77,7 +76,7 @@
 #'   does not fit its space. `gym_error_environment` if your function raises an error: it also has
 #'   the classes of that error, which is its `parent`.
 #' @section Warnings: `gym_warning_step_after_done`.
-#' @seealso [GymEnv], [gym_register()], [check_env()], `vignette("own-environment")`
+#' @seealso [gym_register()], [check_env()], `vignette("own-environment")`
 #' @export
 #' @examples
 #' # Walk to the right end of a corridor, on slippery ground.
@@ -127,30 +126,79 @@ gym_env <- function(reset, step, observation_space, action_space, ..., render = 
   traits <- new_traits(
     observation_space, action_space, id, max_episode_steps, reward_threshold, render_fps
   )
-  function_env$new(list(
+  r_env$new(list(
     traits = traits, reset = reset, step = step, render = render, vectorized = vectorized,
     parameters = parameters, model = model
   ))
 }
 
-# The definition of sub-environments made from functions: `traits`, the functions, `vectorized`,
-# `parameters`, the values with which each `self` starts, and `wrappers`, see wrap_r_env().
-function_env <- R6Class(
-  "gym_function_env",
-  inherit = GymEnv,
+# An environment written in R. `definition` is what sub-environments are made from: `traits`, the
+# functions, `vectorized`, `parameters`, the values with which each `self` starts, and `wrappers`,
+# see wrap_r_env().
+r_env <- R6Class(
+  c("gym_r_env", "gym_env"),
+  cloneable = FALSE,
   public = list(
+    observation_space = NULL,
+    action_space = NULL,
+    single_observation_space = NULL,
+    single_action_space = NULL,
+    num_envs = NULL,
+    vectorization_mode = NULL,
+    autoreset_mode = NULL,
+    spec = NULL,
+    client = NULL,
     initialize = function(definition) {
-      private$gym_definition <- definition
-      private$gym_sub_env <- definition_sub_env(definition)
-      become_sub_env(self, private$gym_sub_env)
+      traits <- definition$traits
+      private$definition <- definition
+      private$sub_env <- definition_sub_env(definition)
+      n <- private$sub_env$num_envs
+      spread <- function(space) if (is.null(n)) space else spread_bounds(batch_space(space, n))
+      self$single_observation_space <- traits$observation_space
+      self$single_action_space <- traits$action_space
+      self$observation_space <- spread(traits$observation_space)
+      self$action_space <- spread(traits$action_space)
+      self$num_envs <- n
+      self$spec <- traits$spec
+    },
+    reset = function(seed = NULL, options = NULL, return_info = FALSE) {
+      check_sub_env_open(private$sub_env)
+      seed <- plain_numbers(seed)
+      check_seed(seed, min = 0)
+      check_flag(return_info)
+      if (!is.null(options)) {
+        check_named_list(options)
+      }
+      observation <- reset_sub_env(private$sub_env, seed, options, call = rlang::current_env())
+      if (return_info) list(observation = observation, info = list()) else observation
+    },
+    step = function(action) step_r_env(private$sub_env, action),
+    render = function() {
+      call <- rlang::current_env()
+      sub_env <- private$sub_env
+      check_sub_env_open(sub_env, call)
+      check_was_reset(sub_env, call)
+      check_renders(sub_env, call)
+      drawn <- draw_sub_env(sub_env, call)
+      if (is.raw(drawn)) frame_from_png(drawn) else drawn
+    },
+    close = function() {
+      private$sub_env$closed <- TRUE
+      invisible(self)
+    },
+    print = function(...) {
+      print_env(self, "vectorised", self$observation_space, self$action_space)
     }
   ),
-  private = list(gym_definition = NULL)
+  active = list(is_open = function() !private$sub_env$closed),
+  private = list(definition = NULL, sub_env = NULL)
 )
 
-# NULL for an object of a user's class.
+sub_env_of <- function(env) env$.__enclos_env__$private$sub_env
+
+# NULL for any other environment.
 definition_of <- function(env) {
-  if (inherits(env, "gym_function_env")) env$.__enclos_env__$private$gym_definition
+  if (inherits(env, "gym_r_env")) env$.__enclos_env__$private$definition
 }
 
 #' Make a sub-environment from functions, with its own `self`
@@ -204,4 +252,82 @@ check_takes <- function(f, arguments, arg = rlang::caller_arg(f), call = rlang::
       class = "gym_error_argument", argument = arg, value = f, call = call
     )
   }
+}
+
+step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
+  check_sub_env_open(sub_env, call)
+  traits <- sub_env$traits
+  which <- if (!is.null(sub_env$num_envs)) seq_len(sub_env$num_envs)
+  check_was_reset(sub_env, call)
+  action <- checked_action(traits, narrow_values(action), which, call)
+  out <- complete_step(raw_step(sub_env, action, call), sub_env, call = call)
+  if (isTRUE(all(sub_env$ended))) {
+    # NA: the episode is over, and the warning has been given.
+    sub_env$ended <- NA
+    warn_step_after_end(traits$spec$id, call)
+  } else {
+    sub_env$ended <- sub_env$ended | out$terminated | out$truncated
+  }
+  list(
+    observation = out$observation, reward = out$reward, done = out$terminated | out$truncated,
+    info = out$info, terminated = out$terminated, truncated = out$truncated
+  )
+}
+
+check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
+  if (sub_env$closed) abort_closed("Make a new one.", call)
+}
+
+# Shared values ------------------------------------------------------------------------
+
+#' Refuse values that all sub-environments would share
+#'
+#' R copies no environment, and so no object of R6. What functions enclose is not looked at.
+#' @param values A list with names: the values with which each `self` starts, or the arguments of an
+#'   entry point.
+#' @noRd
+check_not_shared <- function(values, call = rlang::caller_env()) {
+  for (name in names(values)) {
+    shared <- shared_object(values[[name]], name)
+    if (!is.null(shared)) abort_shared(shared, name, call)
+  }
+}
+
+# The first environment in a value or, if it is a list, in its elements: a list of `path` and
+# `object`. A class of R6 is an environment whose state nobody changes, and so are objects of this
+# package in a list, such as a client.
+shared_object <- function(value, path) {
+  if (is.environment(value) && !inherits(value, "R6ClassGenerator")) {
+    return(list(path = path, object = value))
+  }
+  if (is.list(value) && !any(startsWith(class(value), "gym_"))) {
+    keys <- rlang::names2(value)
+    for (i in seq_along(value)) {
+      inside <- if (nzchar(keys[[i]])) path_key(path, keys[[i]]) else paste0(path, "[[", i, "]]")
+      found <- shared_object(.subset2(value, i), inside)
+      if (!is.null(found)) {
+        return(found)
+      }
+    }
+  }
+}
+
+abort_shared <- function(shared, name, call) {
+  object <- shared$object
+  class <- if (is.object(object)) class(object)[[1L]]
+  again <- if (is_playable(object)) {
+    paste0("gym_make(\"", object$spec$id, "\", seed = 1)")
+  } else if (inherits(object, "R6")) {
+    paste0(class, "$new()")
+  } else {
+    "new.env()"
+  }
+  what <- if (is.null(class)) "an environment of R" else paste("an object of class", class)
+  gym_abort(
+    c(paste0("`", shared$path, "` is ", what, ", which all sub-environments would share."),
+      i = paste0("Let each make its own in `reset`: `if (is.null(self$", name, ")) self$", name,
+                 " <- ", again, "`."),
+      i = "If nothing changes it, the functions can use it without `self`."),
+    class = "gym_error_argument", argument = name, value = object, call = call
+  )
 }

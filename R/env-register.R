@@ -4,14 +4,13 @@
 #' and [env_registry()] then accept. It is registered until the end of the session. Registering an
 #' id again replaces the environment, even one of Gymnasium.
 #'
-#' If several sub-environments are played together, `entry_point` makes each of them. If it is or
-#' returns an environment of [gym_env()], that is copied. Random numbers in `entry_point` use the
-#' same seed every time, so that all copies are the same environment. Draw values that should differ
-#' between episodes in `reset`.
+#' If several sub-environments are played together, the environment of [gym_env()] is copied. Random
+#' numbers in `entry_point` use the same seed every time, so that it always makes the same
+#' environment. Draw values that should differ between episodes in `reset`.
 #'
 #' @param id The id, a string of letters, digits and `_.:/-`, such as `"Corridor-v0"`.
-#' @param entry_point The environment's maker: an environment of [gym_env()], a function that
-#'   returns an environment, or the R6 generator of a class that inherits from [GymEnv].
+#' @param entry_point The environment's maker: an environment of [gym_env()], or a function that
+#'   returns an environment.
 #' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] can override.
 #'   For an environment of [gym_env()] they are values with which each `self` starts.
 #' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
@@ -21,7 +20,7 @@
 #' @return The id, invisibly.
 #' @section Errors: `gym_error_argument` for an invalid argument, and from `gym_unregister()` for an
 #'   id that is not registered.
-#' @seealso [gym_env()], [GymEnv]
+#' @seealso [gym_env()]
 #' @export
 #' @examples
 #' guess <- gym_env(
@@ -48,10 +47,9 @@ gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_
   arguments <- list(...)
   check_dots_named(arguments, "size = 5")
   check_not_shared(arguments)
-  check_fields_not_shared(entry_point, rlang::current_env())
   check_count(max_episode_steps, allow_null = TRUE)
   check_number(reward_threshold, allow_null = TRUE)
-  if (inherits(entry_point, "gym_function_env")) {
+  if (inherits(entry_point, "gym_r_env")) {
     check_parameters(arguments, definition_of(entry_point), id)
   }
   changes <- list(
@@ -82,17 +80,8 @@ gym_unregister <- function(id) {
 }
 
 check_entry_point <- function(entry_point, call = rlang::caller_env()) {
-  if (inherits(entry_point, "gym_r_env") && is.null(definition_of(entry_point))) {
-    gym_abort(
-      c("`entry_point` must not be an object of a class, because it is one environment only.",
-        i = paste0("Give the class itself, `", class(entry_point)[[1L]], "`.")),
-      class = "gym_error_argument", argument = "entry_point", value = entry_point, call = call
-    )
-  }
-  if (!inherits(entry_point, c("gym_function_env", "R6ClassGenerator")) &&
-        !is.function(entry_point)) {
-    must <- paste("an environment of `gym_env()`, a function that returns an environment, or an",
-                  "R6 generator")
+  if (!inherits(entry_point, "gym_r_env") && !is.function(entry_point)) {
+    must <- "an environment of `gym_env()`, or a function that returns an environment"
     abort_argument(entry_point, must, "entry_point", call)
   }
 }
@@ -128,28 +117,22 @@ make_entry <- function(id, arguments, call) {
   given <- registered$arguments
   given[names(arguments)] <- arguments
   entry_point <- registered$entry_point
-  if (inherits(entry_point, "gym_function_env")) {
-    return(change_function_env(entry_point, changes, given, id, call))
+  if (inherits(entry_point, "gym_r_env")) {
+    return(change_r_env(entry_point, changes, given, id, call))
   }
-  make <- if (is.function(entry_point)) entry_point else entry_point$new
-  check_taken(names(given), entry_point, id, call)
-  env <- with_generator(new_generator(0L), do.call(make, given))
+  known <- names(formals(args(entry_point)))
+  strange <- if (!"..." %in% known) setdiff(names(given), known)
+  refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
+  env <- with_generator(new_generator(0L), do.call(entry_point, given))
   if (!is_playable(env)) {
     gym_abort(
       c(paste0("The `entry_point` of ", id, " must return an environment, not ",
                describe_argument(env), "."),
-        i = "Make one by `gym_env()`, or by a class that inherits from `GymEnv`."),
+        i = "Make one by `gym_env()`."),
       class = "gym_error_argument", argument = "entry_point", value = env, call = call
     )
   }
-  if (inherits(env, "gym_function_env")) {
-    env <- change_function_env(env, changes, list(), id, call)
-  } else if (inherits(env, "gym_r_env")) {
-    sub_env <- sub_env_of(env)
-    sub_env$traits <- change_traits(sub_env$traits, changes)
-    env$spec <- sub_env$traits$spec
-  }
-  env
+  if (inherits(env, "gym_r_env")) change_r_env(env, changes, list(), id, call) else env
 }
 
 own_limit <- function(max_episode_steps, call) {
@@ -160,24 +143,12 @@ own_limit <- function(max_episode_steps, call) {
 }
 
 # Another environment with the same functions and other values.
-change_function_env <- function(env, changes, parameters, id, call) {
+change_r_env <- function(env, changes, parameters, id, call) {
   definition <- definition_of(env)
   check_parameters(parameters, definition, id, call)
   definition$traits <- change_traits(definition$traits, changes)
   definition$parameters[names(parameters)] <- parameters
-  function_env$new(definition)
-}
-
-# Checks the arguments against those of the function, or of the `initialize()` of the class or of
-# one that it inherits from; without one it has none.
-check_taken <- function(given, entry_point, id, call) {
-  taken <- entry_point
-  while (inherits(taken, "R6ClassGenerator")) {
-    taken <- taken$public_methods$initialize %||% taken$get_inherit()
-  }
-  known <- if (!is.null(taken)) names(formals(args(taken)))
-  strange <- if (!"..." %in% known) setdiff(given, known)
-  refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
+  r_env$new(definition)
 }
 
 # A value that the functions do not use would change nothing.
@@ -240,7 +211,7 @@ with_num_envs <- function(env, num_envs, id, call) {
       class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
     )
   }
-  change_function_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
+  change_r_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
 }
 
 #' Convert a registered environment to a vector environment
@@ -248,29 +219,7 @@ with_num_envs <- function(env, num_envs, id, call) {
 registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
                                   call = rlang::caller_env()) {
   env <- make_registered(id, arguments, call)
-  if (!inherits(env, "gym_r_env") || !is.null(definition_of(env))) {
-    return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
-  }
-  check_count(num_envs, allow_null = TRUE, call = call)
-  envs <- list(env)
-  another <- function() {
-    made <- make_registered(id, arguments, call)
-    if (any(vapply(envs, identical, NA, made))) abort_made_once(id, call)
-    envs[[length(envs) + 1L]] <<- made
-    sub_env_of(made)
-  }
-  vector_env <- r_vector_env(env, num_envs, max_envs, frames, another, call)
-  vector_env$close <- function(wait = TRUE) for (env in envs) env$close()
-  vector_env
-}
-
-abort_made_once <- function(id, call) {
-  gym_abort(
-    c(paste0("The `entry_point` of ", bare_id(id), " returned the same object twice, which all ",
-             "sub-environments would share."),
-      i = "Let it make another one in each call, such as by `$new()`."),
-    class = "gym_error_argument", argument = "entry_point", call = call
-  )
+  as_vector_env(env, num_envs, max_envs = max_envs, frames = frames)
 }
 
 # In the registry ----------------------------------------------------------------------
@@ -299,7 +248,7 @@ registered_rows <- function(search = NULL) {
 # The part of the spec that is known without making the environment.
 registered_spec <- function(id) {
   registered <- the_session$environments[[id]]
-  spec <- if (inherits(registered$entry_point, "gym_function_env")) registered$entry_point$spec
+  spec <- if (inherits(registered$entry_point, "gym_r_env")) registered$entry_point$spec
   spec <- as.list(spec)
   spec[names(registered$changes)] <- registered$changes
   spec

@@ -31,22 +31,11 @@
 #'
 #' # Environments written in R
 #'
-#' An environment of [gym_env()] or of a class that inherits from [GymEnv] is wrapped at once; the
-#' result is a new environment with the same functions. An id from [gym_register()] is wrapped when
-#' it is made. In addition to the three above, there are seven wrappers for them, with Gymnasium's
-#' arguments and formulas:
-#' * `"TimeLimit"`: `max_episode_steps`, the number of steps after which an episode is cut off;
-#' * `"ClipAction"`: moves every action of a Box to its bounds;
-#' * `"RescaleAction"`: `min_action` and `max_action`, the new bounds of the actions;
-#' * `"RescaleObservation"`: `min_obs` and `max_obs`, the new bounds of the observations;
-#' * `"ClipReward"`: `min_reward` and `max_reward`, one of which may be missing;
-#' * `"NormalizeObservation"`: `epsilon`, 1e-8 by default; observations minus their mean so far,
-#'   divided by their standard deviation so far;
-#' * `"NormalizeReward"`: `gamma`, 0.99, and `epsilon`, 1e-8 by default; rewards divided by the
-#'   standard deviation so far of their discounted sum.
-#'
-#' The last two remember earlier episodes of the same [rollout()] or search. In a vectorised
-#' environment they use all running sub-environments together.
+#' An environment of [gym_env()] is wrapped at once; the result is a new environment with the same
+#' functions. An id from [gym_register()] is wrapped when it is made. Its wrappers are the three
+#' above and `"TimeLimit"`, with `max_episode_steps`, the number of steps after which an episode is
+#' cut off. A wrapper that remembers more than one step is an environment of its own, see
+#' `vignette("own-environment")`.
 #'
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or the result of
 #'   `gym_wrap()` for one; an environment written in R; or, for a wrapper with an R function, one
@@ -197,4 +186,121 @@ wrappers_json <- function(wrappers) {
       kwargs = if (length(kwargs)) to_json(kwargs)
     ))
   }, ""))
+}
+
+# Around environments written in R ----------------------------------------------------------
+
+# A wrapper is made by a function of the traits of the wrapped environment and of its arguments. It
+# returns a list: `traits`, those of the result, and `around`, a function of `inner` (a list of the
+# functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL` if not vectorised),
+# which returns the wrapped functions. It is called for each sub-environment, so each has its own
+# state.
+r_wrappers <- list(
+  TimeLimit = function(traits, max_episode_steps, call) {
+    check_count(max_episode_steps, call = call)
+    limit <- as.integer(min(traits$limit, max_episode_steps))
+    list(
+      traits = change_traits(traits, list(max_episode_steps = limit)),
+      around = function(inner, num_envs) inner
+    )
+  },
+  TransformReward = wrap_transform_reward, TransformObservation = wrap_transform_observation,
+  TransformAction = wrap_transform_action
+)
+
+#' Wrap an environment written in R
+#' @param arguments The wrapper's arguments, a list with names.
+#' @return A new environment with the same functions.
+#' @noRd
+wrap_r_env <- function(env, wrapper, arguments, call) {
+  if (!inherits(env, "gym_r_env")) {
+    must <- "the id of an environment, or one made by `gym_make()` or by `gym_env()`"
+    abort_argument(env, must, "env_id", call)
+  }
+  definition <- definition_of(env)
+  made <- make_r_wrapper(definition$traits, wrapper, arguments, call)
+  made$traits$spec$wrappers <- c(made$traits$spec$wrappers, wrapper)
+  definition$traits <- made$traits
+  definition$wrappers <- c(definition$wrappers, list(made$around))
+  # A wrapper may change the transitions of the model.
+  definition["model"] <- list(NULL)
+  r_env$new(definition)
+}
+
+make_r_wrapper <- function(traits, wrapper, arguments, call) {
+  check_r_wrapper(wrapper, call)
+  check_wrapper_arguments(wrapper, arguments, call)
+  rlang::exec(r_wrappers[[wrapper]], traits, !!!arguments, call = call)
+}
+
+check_wrapper_arguments <- function(wrapper, arguments, call) {
+  make <- r_wrappers[[wrapper]]
+  known <- setdiff(names(formals(make)), c("traits", "call"))
+  strange <- setdiff(names(arguments), known)
+  needed <- known[vapply(formals(make)[known], is_without_default, NA)]
+  lacking <- setdiff(needed, names(arguments))
+  if (length(strange) || length(lacking)) {
+    has <- if (length(known)) paste0("its arguments are `", paste(known, collapse = "`, `"), "`")
+    gym_abort(
+      paste0(
+        wrapper,
+        if (length(strange)) " has no argument `" else " needs the argument `",
+        c(strange, lacking)[[1L]], "`: ", has %||% "it has none", "."
+      ),
+      class = "gym_error_argument", argument = c(strange, lacking)[[1L]], call = call
+    )
+  }
+}
+
+is_without_default <- function(formal) rlang::is_missing(formal)
+
+check_r_wrapper <- function(wrapper, call) {
+  check_wrapper_has_not_ended(wrapper, call)
+  if (!wrapper %in% names(r_wrappers)) {
+    gym_abort(
+      c(paste0("There is no wrapper \"", wrapper, "\" for environments written in R."),
+        i = paste0("There are ", paste(names(r_wrappers), collapse = ", "), ".")),
+      class = "gym_error_argument", argument = "wrapper", value = wrapper, call = call
+    )
+  }
+}
+
+# The functions of an environment in R, whose results are checked before another function of the
+# user gets them. In a vectorised one, sub-environments whose episode has ended may return anything;
+# the result of a running one replaces theirs.
+checked_functions <- function(inner, traits, num_envs) {
+  force(inner)
+  n <- num_envs %||% 1L
+  playing <- seq_len(n)
+  where <- function(name) paste0("`", name, "()` of ", traits$spec$id)
+  checked <- function(observation, name) {
+    checked_observation(traits, observation, num_envs, where(name), NULL)
+  }
+  list(
+    reset = function(seed, options, ...) {
+      playing <<- seq_len(n)
+      observation <- inner$reset(seed, options)
+      marking_wrapper(checked(observation, "reset"))
+    },
+    step = function(action, ...) {
+      out <- inner$step(action)
+      if (length(playing) && length(playing) < n) {
+        out <- without_ended(out, traits$observation_space, playing, n)
+      }
+      marking_wrapper({
+        out <- check_step_parts(out, n, where("step"), NULL)
+        out$observation <- checked(out$observation, "step")
+      })
+      if (n > 1L) playing <<- setdiff(playing, which(out$terminated | out$truncated))
+      out
+    }
+  )
+}
+
+# Marks errors that already name their origin.
+marking_wrapper <- function(code) {
+  tryCatch(code, gym_error = function(cnd) {
+    class(cnd) <- c("gym_error_wrapper", class(cnd))
+    rlang::cnd_signal(cnd)
+  })
 }

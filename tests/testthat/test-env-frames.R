@@ -89,11 +89,10 @@ test_that("a vector environment is refused, and a flag must be one", {
 })
 
 test_that("several sub-environments whose frames are wanted are refused, however they are named", {
-  drawn <- R6::R6Class("Drawn", inherit = GymEnv, public = list(
-    observation_space = space_discrete(1), action_space = space_discrete(2),
-    reset = function() 0, render = function() array(255L, c(8, 8, 3)),
-    step = function(action) list(observation = 0, reward = 1, terminated = TRUE)
-  ))
+  drawn <- gym_env(
+    function(self) 0, function(self, action) list(observation = 0, reward = 1, terminated = TRUE),
+    space_discrete(1), space_discrete(2), render = function(self) array(255L, c(8, 8, 3))
+  )
   gym_register("Drawn-v0", drawn)
   withr::defer(gym_unregister("Drawn-v0"))
   play <- function(env, num_envs) {

@@ -29,7 +29,7 @@ test_that("a value that all sub-environments would share is refused, with the wa
   expect_identical(lengths$length, rep(5L, 40L))
 })
 
-test_that("arguments and classes that are registered share nothing, either", {
+test_that("arguments that are registered share nothing, either", {
   on.exit(try(gym_unregister("Shared-v0"), silent = TRUE))
   refused <- function(code, words) {
     expect_error(code, words, fixed = TRUE, class = "gym_error_argument")
@@ -37,15 +37,4 @@ test_that("arguments and classes that are registered share nothing, either", {
   refused(gym_register("Shared-v0", counting, b = new.env()), "`b` is an environment of R")
   gym_register("Shared-v0", counting, b = NULL)
   refused(rollout("Shared-v0", policy_random(), b = new.env()), "`b` is an environment of R")
-  base <- R6::R6Class("Base", inherit = GymEnv, private = list(b = new.env()))
-  refused(gym_register("Shared-v0", R6::R6Class("Child", inherit = base)),
-          "Let each make its own in `initialize()`")
-  single <- R6::R6Class("Single", inherit = GymEnv, public = list(
-    observation_space = space_discrete(1), action_space = space_discrete(1),
-    reset = function() 0,
-    step = function(action) list(observation = 0, reward = 1, terminated = TRUE)
-  ))
-  only <- single$new()
-  gym_register("Shared-v0", function() only)
-  refused(rollout("Shared-v0", policy_random(), 2), "returned the same object twice")
 })

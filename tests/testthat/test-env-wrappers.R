@@ -122,23 +122,102 @@ test_that("values that a wrapper has changed have no units and no limits", {
   car <- slow_car()
   kept <- list(names = c("position (m)", "velocity", "action"), limits = 1L)
   expect_identical(labels(car), kept)
-  expect_identical(labels(gym_wrap(car, "ClipReward", max_reward = 0)), kept)
+  expect_identical(labels(gym_wrap(car, "TimeLimit", max_episode_steps = 3)), kept)
   changed <- list(names = c("position", "velocity", "action"), limits = 0L)
   tenth <- function(observation) observation / 10
   network <- policy_network(c(2, 3), weights = list(matrix(1:6 / 10, 3)))
-  for (wrapped in list(
-    gym_wrap(car, "NormalizeObservation"),
-    gym_wrap(car, "RescaleObservation", min_obs = -1, max_obs = 1),
-    gym_wrap(car, "TransformObservation", func = tenth)
-  )) {
-    expect_identical(labels(wrapped), changed)
-    map <- decision_map(wrapped, network, xlim = 0:1, ylim = 0:1)
-    expect_identical(ggplot2::autoplot(map)$labels$x, "position")
-  }
+  wrapped <- gym_wrap(car, "TransformObservation", func = tenth)
+  expect_identical(labels(wrapped), changed)
+  map <- decision_map(wrapped, network, xlim = 0:1, ylim = 0:1)
+  expect_identical(ggplot2::autoplot(map)$labels$x, "position")
   own <- gym_wrap(car, "TransformObservation", func = tenth,
                   observation_space = space_box(-1, 1, shape = 2))
   expect_identical(labels(own)$names, c("obs_1", "obs_2", "action"))
   swapped <- gym_wrap(car, "TransformObservation", func = function(observation) observation[, 2:1])
   expect_error(rollout(swapped, policy_random(), 2, num_envs = 2),
                "returned `velocity`, `position` for", class = "gym_error_wrapper")
+})
+
+# Around environments written in R ---------------------------------------------------------
+
+# Walks to the right, by what the action says.
+steps_of <- function(vectorized = FALSE, ..., reward = function(x) x,
+                     ends = function(x) x >= 3) {
+  gym_env(
+    function(self) {
+      n <- if (vectorized) self$num_envs else 1
+      self$x <- matrix(runif(2 * n), n)
+      if (vectorized) self$x else self$x[1, ]
+    },
+    function(self, action) {
+      self$x <- self$x + as.vector(action)
+      list(
+        observation = if (vectorized) self$x else self$x[1, ], reward = reward(self$x[, 1]),
+        terminated = ends(self$x[, 1])
+      )
+    },
+    observation_space = space_box(c(x = -10, y = -10), 10), action_space = space_box(0, 1),
+    vectorized = vectorized, ...
+  )
+}
+
+test_that("an id that is registered is wrapped when it is made, and played so", {
+  gym_register("Steps-v0", steps_of())
+  withr::defer(gym_unregister("Steps-v0"))
+  wrapped <- "Steps-v0" |>
+    gym_wrap("TimeLimit", max_episode_steps = 2) |>
+    gym_wrap("TransformReward", func = function(reward) pmin(reward, 0.5))
+  expect_s3_class(wrapped, "gym_wrapped")
+  played <- rollout(wrapped, policy_random(), episodes = 20, seed = 1)
+  expect_identical(played$episodes$length, rep(2L, 20))
+  expect_true(all(played$episodes$return <= 1))
+  env <- gym_make(wrapped)
+  expect_identical(env$spec$max_episode_steps, 2L)
+  also <- gym_make("Steps-v0", wrappers = list(list("TimeLimit", max_episode_steps = 2)))
+  expect_identical(also$spec$max_episode_steps, 2L)
+})
+
+test_that("a wrapped environment is one in which nothing is wrong", {
+  for (vectorized in c(FALSE, TRUE)) {
+    env <- gym_wrap(steps_of(vectorized), "TimeLimit", max_episode_steps = 3)
+    expect_identical(nrow(check_env(env)), 0L)
+    env$reset()
+    for (step in 1:3) out <- env$step(rep(0, env$num_envs %||% 1))
+    expect_true(all(out$truncated))
+  }
+})
+
+test_that("the time limit is Gymnasium's, and never above the environment's own", {
+  env <- steps_of(max_episode_steps = 5)
+  expect_identical(gym_wrap(env, "TimeLimit", max_episode_steps = 9)$spec$max_episode_steps, 5L)
+  expect_identical(gym_wrap(env, "TimeLimit", max_episode_steps = 3)$spec$max_episode_steps, 3L)
+})
+
+test_that("a wrapper or an argument that there is not is an error that lists what there is", {
+  env <- steps_of()
+  wrong <- function(object, message) {
+    expect_error(object, message, fixed = TRUE, class = "gym_error_argument")
+  }
+  wrong(gym_wrap(env, "FrameStack"), "There is no wrapper \"FrameStack\" for environments")
+  wrong(gym_wrap(env, "FrameStack"), "There are TimeLimit, TransformReward, TransformObs")
+  gym_register("Steps-v0", env)
+  withr::defer(gym_unregister("Steps-v0"))
+  wrong(gym_wrap("Steps-v0", "FrameStack"), "There is no wrapper \"FrameStack\"")
+  wrong(gym_wrap(env, 3), "`wrapper` must be a string")
+  wrong(gym_wrap(3, "TimeLimit"), "`env_id` must be")
+  wrong(gym_wrap(list(), "TimeLimit"), "`env_id` must be the id of an environment, or one made by")
+  wrong(gym_wrap(env, "TimeLimit", 3), "Further arguments need names")
+  wrong(gym_wrap(env, "TimeLimit"),
+        "TimeLimit needs the argument `max_episode_steps`: its arguments are `max_episode_steps`.")
+  wrong(gym_wrap(env, "TimeLimit", steps = 3), "TimeLimit has no argument `steps`: its arguments")
+  wrong(gym_wrap(env, "TimeLimit", max_episode_steps = 0), "`max_episode_steps` must be")
+})
+
+test_that("a wrapper that has ended names what replaces it", {
+  gym_register("Steps-v0", steps_of())
+  withr::defer(gym_unregister("Steps-v0"))
+  for (env in list(steps_of(), "Steps-v0")) {
+    expect_error(gym_wrap(env, "ClipReward", max_reward = 1), "wrapper \"TransformReward\"",
+                 class = "gym_error_defunct")
+  }
 })

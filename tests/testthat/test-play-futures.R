@@ -264,29 +264,24 @@ test_that("functions travel with what they use of the session", {
     gym_test_policy <- function(observation) 2 * gym_test_list$above(observation[, 1])
     gym_test_shift <- 5
     gym_test_reward <- function(reward) reward + gym_test_shift
-    gym_test_walk <- R6::R6Class(
-      inherit = gym::GymEnv,
-      public = list(
-        at = 0,
-        reset = function() self$at <- 0,
-        step = function(action) {
+    gym_test_base <- R6::R6Class("Base", public = list(start = function() 0))
+    gym_test_class <- R6::R6Class("Child", inherit = gym_test_base)
+    gym_test_walk <- function() {
+      gym::gym_env(
+        function(self) self$at <- gym_test_class$new()$start(),
+        function(self, action) {
           self$at <- self$at + 1
           list(observation = self$at, reward = gym_test_shift, terminated = self$at == 3)
-        }
-      )
-    )
-    gym_test_class <- R6::R6Class(
-      "Walk", inherit = gym_test_walk,
-      public = list(
+        },
         observation_space = gym::space_discrete(4), action_space = gym::space_discrete(2)
       )
-    )
+    }
   })
   eval(define, globalenv())
   withr::defer(rm(list = c("gym_test_limit", "gym_test_list", "gym_test_policy", "gym_test_shift",
-                           "gym_test_reward", "gym_test_walk", "gym_test_class"),
+                           "gym_test_reward", "gym_test_base", "gym_test_class", "gym_test_walk"),
                   envir = globalenv()))
-  gym_register("Session-v0", get("gym_test_class", globalenv()))
+  gym_register("Session-v0", get("gym_test_walk", globalenv()))
   withr::defer(gym_unregister("Session-v0"))
   play <- function() {
     policy <- get("gym_test_policy", globalenv())

@@ -5,3 +5,9 @@ test_that("a function that has ended names what replaces it", {
   expect_error(gym::search_landscape(), "`search_landscape()` has ended", fixed = TRUE,
                class = "gym_error_defunct")
 })
+
+test_that("a class that inherits from GymEnv names what replaces it", {
+  walk <- R6::R6Class("Walk", inherit = GymEnv, public = list(reset = function() 0))
+  cnd <- expect_error(walk$new(), "The class GymEnv has ended", class = "gym_error_defunct")
+  expect_match(conditionMessage(cnd), "functions of `self` to `gym_env()`", fixed = TRUE)
+})

@@ -125,9 +125,6 @@ test_that("an environment in R may return integer64, and takes actions that are"
     expect_identical(played$steps$reward, c(-2, -2, -2))
     expect_identical(played$steps$action, c(2, 2, 2))
   }
-  clipped <- gym_wrap(counter(), "ClipReward", max_reward = -1)
-  clipped$reset(seed = 1)
-  expect_identical(clipped$step(3)$reward, -3)
   floats <- gym_env(
     function(self) int64(c(1, 2)),
     function(self, action) list(observation = int64(c(3, -4)), reward = action, terminated = TRUE),

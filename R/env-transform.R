@@ -1,6 +1,6 @@
 # Wrappers that call a user's function in each step, named as in Gymnasium. The function gets
-# batches; a single environment has a batch of one. They wrap environments in R (env-r-wrappers.R)
-# and those of a server (env-wrapped-server.R).
+# batches; a single environment has a batch of one. They wrap environments in R and those of a
+# server (env-wrapped-server.R).
 
 # The arguments that each function may have; the first one is what it changes.
 transforms <- list(
@@ -170,7 +170,7 @@ observation_memory <- function(transform, traits, n) {
 #' @param inside,outside The traits of the wrapped environment, and of the result.
 #' @param around A function of `inner`, whose functions take and return batches, of the number of
 #'   sub-environments, and of whether the step after an end only resets. It returns such functions.
-#' @return A function like `around` of env-r-wrappers.R. An environment of a server is its third
+#' @return A function like `around` of `r_wrappers`. An environment of a server is its third
 #'   argument: its results are already checked.
 #' @noRd
 around_batches <- function(inside, outside, around) {
@@ -202,45 +202,6 @@ convert_functions <- function(inner, observation, action) {
       out
     }
   )
-}
-
-# The functions of an environment in R, whose results are checked before another function of the
-# user gets them. In a vectorised one, sub-environments whose episode has ended may return anything;
-# the result of a running one replaces theirs.
-checked_functions <- function(inner, traits, num_envs) {
-  force(inner)
-  n <- num_envs %||% 1L
-  playing <- playing_sub_envs(n)
-  where <- function(name) paste0("`", name, "()` of ", traits$spec$id)
-  checked <- function(observation, name) {
-    checked_observation(traits, observation, num_envs, where(name), NULL)
-  }
-  follow_ends(list(
-    reset = function(seed, options, ...) {
-      observation <- inner$reset(seed, options)
-      marking_wrapper(checked(observation, "reset"))
-    },
-    step = function(action, ...) {
-      out <- inner$step(action)
-      which <- playing$which
-      if (length(which) && length(which) < n) {
-        out <- without_ended(out, traits$observation_space, which, n)
-      }
-      marking_wrapper({
-        out <- check_step_parts(out, n, where("step"), NULL)
-        out$observation <- checked(out$observation, "step")
-      })
-      out
-    }
-  ), playing)
-}
-
-# Marks errors that already name their origin.
-marking_wrapper <- function(code) {
-  tryCatch(code, gym_error = function(cnd) {
-    class(cnd) <- c("gym_error_wrapper", class(cnd))
-    rlang::cnd_signal(cnd)
-  })
 }
 
 # The user's function --------------------------------------------------------------------
@@ -353,4 +314,53 @@ form_batch <- function(space, value, n) {
     dim(value) <- c(1L, length(value))
   }
   value
+}
+
+# Errors about what a function returns --------------------------------------------------
+
+# Columns in another order would get each other's names.
+check_names_order <- function(transform, space, observation) {
+  given <- colnames(observation) %||% names(observation)
+  if (!is.null(given) && setequal(given, space$names) && !identical(given, space$names)) {
+    abort_transform(
+      transform, paste0("returned ", few_names(given), " for observations with the numbers ",
+                        few_names(space$names)),
+      observation, fix = "If their order is to change, give the new `observation_space`."
+    )
+  }
+}
+
+refuse_misfit <- function(transform, space, value, n, arg, given) {
+  tryCatch(
+    check_batch(space, batch_space(space, n), value, n, NULL, bounds = TRUE),
+    gym_error_space = function(cnd) {
+      abort_transform(
+        transform,
+        paste0("must return ", count_of(n, sub("_space", "", arg)), " of ", format(space), ", not ",
+               describe_argument(value), ": ", sub("[.]$", "", first_line(cnd))),
+        value, parent = cnd, class = "gym_error_space",
+        fix = if (arg == "observation_space" && is.null(given)) {
+          "If it changes the space of observations, give the new one as `observation_space`."
+        }
+      )
+    }
+  )
+}
+
+abort_transform <- function(transform, problem, value = NULL, class = "gym_error_argument",
+                            fix = NULL, ...) {
+  gym_abort(
+    c(paste0("`func` of ", transform$wrapper, " ", problem, "."), i = fix, i = transform$hint),
+    class = c("gym_error_wrapper", class), wrapper = transform$wrapper, argument = "func",
+    value = value, ..., call = NULL
+  )
+}
+
+transform_hint <- function(asked, space) {
+  rows <- if ("observation" %in% asked && length(space$shape) == 1L) {
+    name <- if (is.null(space$names)) 1L else paste0("\"", space$names[[1L]], "\"")
+    paste0(": `observation[, ", name, "]` has a number for each, `observation[1]` only one")
+  }
+  paste0("It gets a batch, with a row for each sub-environment", rows,
+         "; `ifelse()` chooses for each, `if` cannot.")
 }
