@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -48,36 +48,11 @@ def plain(value: object, depth: int = 0) -> object:
 
 def brief(value: object, width: int = 80) -> str:
     """Return a value as JSON text of at most ``width`` characters, for error messages."""
-    text = ""
-    for piece in _pieces(value, width):
-        text += piece
-        # Stop here: the rest may be as large as a request.
-        if len(text) > width:
-            break
-    return shortened(text, width)
-
-
-def _pieces(value: object, width: int) -> Iterator[str]:
-    """Yield the JSON text of a value piece by piece; at most ``width`` characters of a string."""
-    if isinstance(value, str):
-        yield json.dumps(value[:width])
-    elif isinstance(value, Mapping):
-        yield "{"
-        for index, (key, item) in enumerate(value.items()):
-            yield f"{', ' if index else ''}{brief(_key(key), width)}: "
-            yield from _pieces(item, width)
-        yield "}"
-    elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
-        yield "["
-        for index, item in enumerate(value):
-            yield ", " if index else ""
-            yield from _pieces(item, width)
-        yield "]"
-    else:
-        try:
-            yield json.dumps(plain(value))
-        except ValueError:
-            yield _repr(type(value))
+    try:
+        return shortened(json.dumps(plain(value)), width)
+    except ValueError:
+        # Such as an integer of more digits than Python writes.
+        return shortened(_repr(type(value)), width)
 
 
 def shortened(text: str, width: int) -> str:

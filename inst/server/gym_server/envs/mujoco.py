@@ -5,12 +5,11 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import functools
-import logging
 import os
 import sys
 from typing import Any
 
-log = logging.getLogger(__name__)
+from gym_server import logs
 
 # https://registry.khronos.org/EGL/extensions/EXT/EGL_EXT_platform_device.txt
 _EGL_PLATFORM_DEVICE_EXT = 0x313F
@@ -38,13 +37,8 @@ def log_warnings() -> None:
     """Send MuJoCo's warnings to the server's log instead of a file in the working directory."""
     import mujoco
 
-    mujoco.set_mju_user_warning(_log_once)
-
-
-@functools.lru_cache(maxsize=64)
-def _log_once(words: str) -> None:
     # It gives the same one for each environment.
-    log.warning("MuJoCo: %s", words)
+    mujoco.set_mju_user_warning(functools.partial(logs.warn_once, "MuJoCo"))
 
 
 def draw_in_own_context() -> None:

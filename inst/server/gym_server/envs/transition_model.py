@@ -7,11 +7,12 @@ in each state.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from typing import Any
 
 import gymnasium
-import numpy as np
 from gymnasium.spaces import Discrete
 
 from gym_server.envs.wrappers import changing_wrapper
@@ -19,9 +20,6 @@ from gym_server.errors import GymServerError
 from gym_server.json_values import brief
 
 _COLUMNS = ("state", "action", "next_state", "probability", "reward", "terminated")
-
-# The largest FrozenLake map that can be made has 750,000.
-_MOST_TRANSITIONS = 1_000_000
 
 
 def transition_model(env: gymnasium.Env, env_id: str) -> dict:
@@ -54,7 +52,8 @@ def transition_model(env: gymnasium.Env, env_id: str) -> dict:
     _check_table_holds(env, env_id)
     try:
         first = _start(start, num_states)
-        columns = _columns(_transitions(table, num_states, num_actions), env_id)
+        transitions = zip(*_transitions(table, num_states, num_actions), strict=True)
+        columns = dict(zip(_COLUMNS, map(list, transitions), strict=True))
     except _UnsoundError as fault:
         raise GymServerError(
             "not_supported",
@@ -93,41 +92,24 @@ class _UnsoundError(Exception):
     """A table is not a valid transition model."""
 
 
-def _start(distribution: object, num_states: int) -> list[float]:
-    if isinstance(distribution, np.ndarray):
-        distribution = distribution.tolist()
-    if not isinstance(distribution, (list, tuple)) or len(distribution) != num_states:
-        raise _UnsoundError(
-            f"initial_state_distrib must hold a probability for each of the {num_states} states"
-        )
-    start = [_number(probability) for probability in distribution]
-    if not all(0 <= probability <= 1 for probability in start):
-        raise _UnsoundError("initial_state_distrib holds a value that is not a probability")
-    return start
-
-
-def _columns(transitions: Iterable[tuple], env_id: str) -> dict[str, list]:
-    columns: list[list] = [[] for _ in _COLUMNS]
-    appends = [column.append for column in columns]
-    for count, transition in enumerate(transitions):
-        if count == _MOST_TRANSITIONS:
-            raise GymServerError(
-                "not_supported",
-                f"{env_id} has more than {_MOST_TRANSITIONS:,} transitions, the most that a "
-                "response may hold",
-                "create one with fewer states",
-            )
-        for append, value in zip(appends, transition, strict=True):
-            append(value)
-    return dict(zip(_COLUMNS, columns, strict=True))
+def _start(distribution: Any, num_states: int) -> list[float]:
+    with contextlib.suppress(*_NO_NUMBERS):
+        start = [float(probability) for probability in distribution]
+        if len(start) == num_states and all(0 <= probability <= 1 for probability in start):
+            return start
+    raise _UnsoundError(
+        f"initial_state_distrib must hold a probability for each of the {num_states} states"
+    )
 
 
 def _transitions(table: dict, num_states: int, num_actions: int) -> Iterator[tuple]:
     for state in range(num_states):
-        actions = table.get(state)
         for action in range(num_actions):
             name = f"P[{state}][{action}]"
-            outcomes = actions.get(action) if isinstance(actions, dict) else None
+            try:
+                outcomes = table[state][action]
+            except (LookupError, TypeError):
+                outcomes = None
             if not isinstance(outcomes, (list, tuple)) or not outcomes:
                 raise _UnsoundError(f"{name} is no list of transitions")
             for outcome in outcomes:
@@ -136,26 +118,15 @@ def _transitions(table: dict, num_states: int, num_actions: int) -> Iterator[tup
                     yield state, action, next_state, probability, reward, terminated
 
 
-def _read(outcome: object, num_states: int, name: str) -> tuple[float, int, float, bool]:
-    if isinstance(outcome, (list, tuple)) and len(outcome) == 4:
-        probability, next_state, reward = map(_number, outcome[:3])
-        terminated = outcome[3]
-        if (
-            0 <= probability <= 1
-            and 0 <= next_state < num_states
-            and next_state.is_integer()
-            and math.isfinite(reward)
-            and isinstance(terminated, (bool, np.bool_))
-        ):
-            return probability, int(next_state), reward, bool(terminated)
+def _read(outcome: Any, num_states: int, name: str) -> tuple[float, int, float, bool]:
+    with contextlib.suppress(*_NO_NUMBERS):
+        probability, next_state, reward, terminated = outcome
+        state, earned = int(next_state), float(reward)
+        is_state = 0 <= state < num_states and state == next_state
+        if 0 <= probability <= 1 and is_state and math.isfinite(earned):
+            return float(probability), state, earned, bool(terminated)
     raise _UnsoundError(f"{name} holds {brief(outcome)}")
 
 
-def _number(value: object) -> float:
-    """Return a number as a float; NaN for anything else."""
-    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except OverflowError:
-            pass
-    return math.nan
+# What is raised by a value that is not a number, or not so many values.
+_NO_NUMBERS = (TypeError, ValueError, OverflowError)

@@ -44,15 +44,6 @@ def test_warnings_of_others_stay_in_the_log():
     assert heard == []
 
 
-def test_mujoco_repeats_no_warning(monkeypatch):
-    mujoco = pytest.importorskip("gym_server.envs.mujoco")
-    logged = []
-    monkeypatch.setattr(mujoco.log, "warning", lambda *words: logged.append(words))
-    for words in ("settotalmass is deprecated", "settotalmass is deprecated", "another one"):
-        mujoco._log_once(words)
-    assert [words for _, words in logged] == ["settotalmass is deprecated", "another one"]
-
-
 @pytest.mark.parametrize(
     ("env_id", "module", "engine"),
     [
