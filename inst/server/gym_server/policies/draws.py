@@ -78,8 +78,6 @@ def _seed_sequence(seed: int) -> SeedSequence:
 
 def uniforms(*shape: int) -> Draws:
     """Return draws of numbers between 0 and 1, or of arrays of them."""
-    if not shape:
-        return Draws(lambda generator, n: generator.random(n).tolist())
     return Draws(lambda generator, n: list(generator.random((n, *shape))), _most_of(shape))
 
 

@@ -8,7 +8,10 @@ both in another order than a sum of products.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import accumulate
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -16,8 +19,7 @@ from gymnasium.spaces import Box, Discrete
 
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief
-from gym_server.policies.activation import Steps, in_place, middle
-from gym_server.policies.network_plan import NetworkPlan
+from gym_server.policies.activation import HAVE_RANGE, Steps, in_place, middle
 from gym_server.policies.states import NOT_A_STATE, states_of
 
 # Up to this many weights, the matrices of each row are multiplied number by number. With more
@@ -26,6 +28,64 @@ from gym_server.policies.states import NOT_A_STATE, states_of
 _FEW_WEIGHTS = 512
 _BLOCK = 32
 
+
+@dataclass(frozen=True)
+class NetworkPlan:
+    """Everything about a network except its weights.
+
+    Attributes:
+        observation_space: the space of the inputs.
+        action_space: the space of the outputs.
+        sizes: the numbers of inputs, neurons of each hidden layer, and outputs.
+        activation: the activation of each layer after the inputs.
+        bias: whether each neuron has a bias, the last column of its layer's matrix.
+        output: "greedy", "softmax", "gaussian" or "epsilon-greedy".
+        epsilon: how often "epsilon-greedy" explores; None if not given.
+        mean, scale: float64[inputs], which normalize inputs by ``(x - mean) * scale``; None for no
+            normalization.
+        clip_obs: where to clip normalized inputs, on both sides of 0; None for no clipping.
+    """
+
+    observation_space: Box | Discrete
+    action_space: Box | Discrete
+    sizes: tuple[int, ...]
+    activation: tuple[str, ...]
+    bias: bool
+    output: str
+    epsilon: float | None
+    mean: np.ndarray | None = None
+    scale: np.ndarray | None = None
+    clip_obs: float | None = None
+
+    @cached_property
+    def shapes(self) -> list[tuple[int, int]]:
+        """The shape of each layer's matrix: a row per neuron, a column per input."""
+        return [
+            (neurons, taken + self.bias)
+            for taken, neurons in zip(self.sizes[:-1], self.sizes[1:], strict=True)
+        ]
+
+    @cached_property
+    def ends(self) -> list[int]:
+        """Where each layer's weights end; the last one is the number of weights."""
+        return list(accumulate(prod(shape) for shape in self.shapes))
+
+    @property
+    def num_values(self) -> int:
+        """The number of values to choose an action by: two even for a single output."""
+        space = self.action_space
+        return int(space.n) if isinstance(space, Discrete) else self.sizes[-1]
+
+    @property
+    def stretched_from(self) -> str | None:
+        """The activation whose range is stretched to the bounds of a Box; None for no stretching.
+
+        With noise, the outputs are the values of the action.
+        """
+        last = self.activation[-1]
+        return last if last in HAVE_RANGE and self.output == "greedy" else None
+
+
 Forward = Callable[[Any], np.ndarray]
 
 
@@ -33,7 +93,7 @@ def forward(plan: NetworkPlan, weights: np.ndarray, candidate: int | np.ndarray)
     """Return a function that computes outputs, float64[outputs] or float64[outputs, rows].
 
     If a single output chooses between two actions, a row with the middle of its range comes first,
-    as the value of the first action. For one observation that output is a sum; see ``of_number()``.
+    as the value of the first action.
 
     Args:
         plan: what the networks have in common.
@@ -99,8 +159,7 @@ def _layers(plan: NetworkPlan, matrices: list[np.ndarray], rows: tuple[int, ...]
             read = _column_reader(plan.observation_space, matrix, plan.bias, sums)
         else:
             steps += _product(matrix, source, sums)
-        if rows or layer < len(matrices) - 1 or neurons == plan.num_values:
-            steps += in_place(activation, sums)
+        steps += in_place(activation, sums)
         source = target
 
     def outputs(observation: Any) -> np.ndarray:

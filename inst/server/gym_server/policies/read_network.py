@@ -11,8 +11,8 @@ from gymnasium.spaces import Box, Discrete, Space
 from gym_server.errors import GymServerError, invalid_policy
 from gym_server.json_values import brief
 from gym_server.policies.activation import NAMES
+from gym_server.policies.layers import NetworkPlan
 from gym_server.policies.network import NetworkPolicy
-from gym_server.policies.network_plan import NetworkPlan
 from gym_server.policies.reading import (
     above_zero,
     check_fields,

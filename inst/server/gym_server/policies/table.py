@@ -49,27 +49,20 @@ class TablePolicy(Policy):
 
     def actor(self, candidate: int | np.ndarray) -> Actor:
         """Return an actor that looks up the values of a state; see ``Policy.actor()``."""
-        q = self.q
+        q, rows = self.q, np.shape(candidate)
 
-        def values_of(observation: Any) -> list[float]:
-            state = self._index(observation)
-            values: list[float] = q[candidate, state].tolist()
-            if max(values) == -np.inf:
-                raise _no_action(state)
+        def values_of(observation: Any) -> np.ndarray:
+            state = self._indices(observation) if rows else self._index(observation)
+            values: np.ndarray = q[candidate, state].T
+            lacks_action = values.max(axis=0) == -np.inf
+            if np.any(lacks_action):
+                raise _no_action(int(np.extract(lacks_action, state)[0]))
             return values
 
-        def values_of_rows(observation: Any) -> np.ndarray:
-            members = unstack(self.observation_space, observation)
-            states = np.array([self._index(member) for member in members])
-            values: np.ndarray = q[candidate, states].T
-            without = states[values.max(axis=0) == -np.inf]
-            if len(without):
-                raise _no_action(int(without[0]))
-            return values
+        return self.choice.actor(values_of, rows, remembers=not rows)
 
-        if isinstance(candidate, int):
-            return self.choice.actor(values_of, remembers=True)
-        return self.choice.rows_actor(values_of_rows, len(candidate))
+    def _indices(self, batch: Any) -> np.ndarray:
+        return np.array([self._index(one) for one in unstack(self.observation_space, batch)])
 
     def _index(self, observation: Any) -> int:
         try:

@@ -100,7 +100,7 @@ def test_outputs_are_the_numbers_of_a_box(last, width):
 
 
 @pytest.mark.parametrize("stretched_from", [None, "tanh", "logistic"])
-def test_few_and_many_numbers_are_reckoned_alike(stretched_from):
+def test_one_row_and_many_are_reckoned_alike(stretched_from):
     rng = np.random.default_rng(2)
     spaces = [
         Box(-2, 1, (8,), np.float32),
@@ -109,13 +109,13 @@ def test_few_and_many_numbers_are_reckoned_alike(stretched_from):
     ]
     for space in spaces:
         outputs = np.empty(8)
-        few = box_actions(space, stretched_from, None)
-        many = box_actions(space, stretched_from, 1)
+        alone = box_actions(space, stretched_from, ())
+        many = box_actions(space, stretched_from, (1,))
         for _ in range(500):
             outputs[:] = np.tanh(rng.normal(scale=5, size=8))
             if stretched_from is None:
                 outputs *= rng.choice([1, 300, 1e30])
-            one, other = few(outputs), many(outputs)[0]
+            one, other = alone(outputs), many(outputs[None])[0]
             assert one in space
             np.testing.assert_array_equal(one, other)
             assert (one.dtype, one.shape) == (other.dtype, other.shape)
