@@ -102,15 +102,3 @@ def test_a_watcher_that_never_reads_holds_nobody_up(server, pole, deaf):
         step(server, pole, 20)
         while seen["steps"] < 20 * count:
             seen = look(server, pole, seen["number"])
-
-
-def test_a_watcher_that_left_stops_the_drawing(server, pole):
-    number = look(server, pole)["number"]
-    with server.socket() as watcher:
-        watcher.sendall(ask(pole, number))
-        time.sleep(0.2)
-    # One in addition to those that it waited for, and no more.
-    for _ in range(5):
-        step(server, pole, 10)
-        time.sleep(0.05)
-    assert look(server, pole)["number"] <= number + 2

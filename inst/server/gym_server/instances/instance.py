@@ -227,7 +227,7 @@ class Instance(Watchable):
 
     def _begin(self, reset_or_step: Callable[..., tuple], *args: object) -> tuple:
         """Reset or step the environment, on the render thread if it draws meanwhile."""
-        self.begin_reset_or_step()
+        self.resets_and_steps += 1
         if self.draws_when_stepped:
             return self.renderer.run(reset_or_step, *args)
         return reset_or_step(*args)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gym_server.rendering.render_thread import RenderThread
@@ -21,7 +20,6 @@ class Watchable:
         draws_when_stepped: whether its steps run on the render thread.
         draws_on_render_thread: whether its frames are drawn on the render thread.
         resets_and_steps: how many resets and steps have started.
-        on_next: called once when the next one starts; may be None.
     """
 
     lock: InstanceLock
@@ -29,14 +27,6 @@ class Watchable:
     draws_when_stepped: bool
     draws_on_render_thread: bool
     resets_and_steps = 0
-    on_next: Callable[[], None] | None = None
-
-    def begin_reset_or_step(self) -> None:
-        """Count a reset or step that starts."""
-        self.resets_and_steps += 1
-        if self.on_next is not None:
-            call, self.on_next = self.on_next, None
-            call()
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
         """Return what a watcher sees of a sub-environment; the caller holds the lock.
