@@ -143,9 +143,6 @@ format.gym_agent_actor_critic <- function(x, ...) {
 
 #' @rdname agent_actor_critic
 #' @export
-learn_actor_critic <- function(env, iterations = NULL, total_steps = NULL, target = NULL,
-                               episodes = 10, discount = 0.99, learning_rate = 0.1,
-                               actor_rate = 0.1, initial = 0, features = NULL, lambda = 0,
-                               actor_lambda = 0, ...) {
-  make_and_train("agent_actor_critic", rlang::current_env(), ...)
+learn_actor_critic <- function(env, ...) {
+  make_and_train("agent_actor_critic", env, ..., defaults = list(episodes = 10))
 }

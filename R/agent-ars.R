@@ -36,10 +36,10 @@
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
 #' @param policy The policy. `NULL`, the default, uses the preset's policy, or [policy_linear()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. `NULL`,
-#'   the default, uses the preset's budget and the environment's target.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
-#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations`,
+#'   `total_steps`, `target`, `seed` or `checkpoint`; and of the environment, such as
+#'   `continuous = TRUE` for LunarLander. Without a preset a budget is needed: `iterations` or
+#'   `total_steps`.
 #' @return `agent_ars()` returns an agent of class `gym_agent_ars`. `search_ars()` makes this agent,
 #'   trains it and returns the result of [train_agent()].
 #' @section Errors: `gym_error_argument` for an invalid argument.
@@ -139,8 +139,6 @@ format.gym_agent_ars <- function(x, ...) {
 
 #' @rdname agent_ars
 #' @export
-search_ars <- function(env = "CartPole-v1", policy = NULL, directions = NULL, top = NULL,
-                       step_size = NULL, noise = NULL, version = NULL, shift = NULL,
-                       iterations = NULL, total_steps = NULL, target = NULL, ...) {
-  make_and_train("agent_ars", rlang::current_env(), ...)
+search_ars <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_ars", env, policy = policy, ...)
 }

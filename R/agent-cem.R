@@ -16,13 +16,7 @@
 #'   at least 0.
 #' @param extra_iterations The number of iterations after which the extra noise is 0, a whole number
 #'   of at least 1. Its variance decreases by the same amount in each.
-#' @param env The environment, as for [train_agent()]. If it is an id with a row in
-#'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
-#' @param policy The policy. `NULL`, the default, uses the preset's policy, or [policy_linear()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. `NULL`,
-#'   the default, uses the preset's budget and the environment's target.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
-#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @inheritParams agent_ars
 #' @return `agent_cem()` returns an agent of class `gym_agent_cem`. `search_cem()` makes this agent,
 #'   trains it and returns the result of [train_agent()].
 #' @section Errors: `gym_error_argument` for an invalid argument.
@@ -92,8 +86,6 @@ format.gym_agent_cem <- function(x, ...) {
 
 #' @rdname agent_cem
 #' @export
-search_cem <- function(env = "CartPole-v1", policy = NULL, population = NULL, elite = NULL,
-                       noise = NULL, extra_noise = NULL, extra_iterations = NULL,
-                       iterations = NULL, total_steps = NULL, target = NULL, ...) {
-  make_and_train("agent_cem", rlang::current_env(), ...)
+search_cem <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_cem", env, policy = policy, ...)
 }

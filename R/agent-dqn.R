@@ -226,10 +226,6 @@ format.gym_agent_dqn <- function(x, ...) {
 
 #' @rdname agent_dqn
 #' @export
-learn_dqn <- function(env = "CartPole-v1", policy = NULL, memory = NULL, learning_starts = NULL,
-                      batch = NULL, updates_per_step = NULL, learning_rate = NULL, gamma = NULL,
-                      epsilon = NULL, double = NULL, target_every = NULL, target_rate = NULL,
-                      max_grad_norm = NULL, batch_steps = NULL, min_episodes = NULL,
-                      iterations = NULL, total_steps = NULL, target = NULL, ...) {
-  make_and_train("agent_dqn", rlang::current_env(), ...)
+learn_dqn <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_dqn", env, policy = policy, ...)
 }

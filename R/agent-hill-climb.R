@@ -8,11 +8,7 @@
 #'   above 0.
 #' @param candidates The number of candidates per iteration, a whole number of at least 1. The
 #'   default is 1.
-#' @param env The environment, as for [train_agent()].
-#' @param policy The policy, as for [train_agent()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()].
-#' @param ... Further arguments of [train_agent()], such as `seed` or `checkpoint`, and of the
-#'   environment, such as `continuous = TRUE` for LunarLander.
+#' @inheritParams agent_ars
 #' @return `agent_hill_climb()` returns an agent of class `gym_agent_hill_climb`, whose policy has
 #'   the best weights so far. `search_hill_climb()` makes this agent, trains it and returns the
 #'   result of [train_agent()].
@@ -70,8 +66,6 @@ format.gym_agent_hill_climb <- function(x, ...) {
 
 #' @rdname agent_hill_climb
 #' @export
-search_hill_climb <- function(env = "CartPole-v1", policy = policy_linear(), noise = 0.1,
-                              candidates = 1, iterations = NULL, total_steps = NULL,
-                              target = NULL, ...) {
-  make_and_train("agent_hill_climb", rlang::current_env(), ...)
+search_hill_climb <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_hill_climb", env, policy = policy, ...)
 }

@@ -15,8 +15,8 @@
 #' A truncated episode counts as if it had ended there. Its return does not contain later rewards.
 #'
 #' @inheritParams agent_q
-#' @param episodes The number of episodes in an iteration, a whole number of at least 1. `NULL`, the
-#'   default, is 1,000 if the server's processes play them, and 10 otherwise.
+#' @param ... As for [learn_q()]. The default of `episodes` is 1,000 if the server's processes play
+#'   them, and 10 otherwise.
 #' @param visits Which visits of a state and action count: `"first"`, the default, for the first one
 #'   in each episode, or `"every"`.
 #' @param exploring_starts Draw the first action of each episode? `FALSE`, the default, or `TRUE`.
@@ -332,18 +332,15 @@ format.gym_agent_monte_carlo <- function(x, ...) {
 
 #' @rdname agent_monte_carlo
 #' @export
-learn_monte_carlo <- function(env, iterations = NULL, total_steps = NULL, target = NULL,
-                              episodes = NULL, discount = 0.99, epsilon = 0.1, temperature = NULL,
-                              initial = 0, visits = c("first", "every"), exploring_starts = FALSE,
-                              learning_rate = NULL, mask = NULL,
-                              importance = c("none", "weighted", "ordinary"),
-                              target_policy = NULL, ...) {
-  episodes <- episodes %||% default_episodes(env, mask, exploring_starts, importance)
-  make_and_train("agent_monte_carlo", rlang::current_env(), ...)
+learn_monte_carlo <- function(env, ...) {
+  make_and_train(
+    "agent_monte_carlo", env, ..., defaults = list(episodes = default_episodes(env, list(...)))
+  )
 }
 
 # If the server's processes play the episodes, each iteration costs a request.
-default_episodes <- function(env, mask, exploring_starts, importance) {
+default_episodes <- function(env, given) {
   on_server <- rlang::is_string(env) && !is_registered(env) && !grepl(modelled_ids, env)
-  if (on_server && learns_whole(mask, exploring_starts, importance)) 1000 else 10
+  whole <- learns_whole(given[["mask"]], given[["exploring_starts"]], given[["importance"]])
+  if (on_server && whole) 1000 else 10
 }

@@ -256,11 +256,6 @@ format.gym_agent_ppo <- function(x, ...) {
 
 #' @rdname agent_ppo
 #' @export
-learn_ppo <- function(env = "CartPole-v1", policy = NULL, batch_steps = NULL, batch = NULL,
-                      epochs = NULL, learning_rate = NULL, gamma = NULL, lambda = NULL,
-                      clip = NULL, entropy = NULL, value_weight = NULL, max_grad_norm = NULL,
-                      normalize_advantages = NULL, normalize_rewards = NULL, target_kl = NULL,
-                      min_episodes = NULL, iterations = NULL, total_steps = NULL, target = NULL,
-                      ...) {
-  make_and_train("agent_ppo", rlang::current_env(), ...)
+learn_ppo <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_ppo", env, policy = policy, ...)
 }

@@ -78,6 +78,9 @@ preset_settings <- function(row) {
 
 # The arguments that a preset supplies to the function that makes its agent.
 preset_arguments <- function(preset) {
+  if (is.null(preset)) {
+    return(list())
+  }
   if (isTRUE(preset$linear)) {
     falling <- intersect(c("learning_rate", "clip"), names(preset))
     preset[falling] <- lapply(preset[falling], schedule_linear, 0, preset$total_steps)
@@ -95,42 +98,32 @@ sorted_by_name <- function(values) if (length(values)) values[order(names(values
 #' Make an agent and train it
 #'
 #' @param make The name of the function that makes the agent.
-#' @param frame The frame of the user's call, which has the agent's arguments, `env` and some of the
-#'   arguments of [train_agent()]. `NULL` means not given.
-#' @param ... Further arguments of [train_agent()] and of the environment.
+#' @param env The user's environment.
+#' @param ... Arguments of `make`, of [train_agent()] and of the environment.
+#' @param defaults Arguments of [train_agent()], for what neither the user nor the preset gives.
+#' @param frame The frame of the user's call.
 #' @noRd
-make_and_train <- function(make, frame, ...) {
+make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::caller_env()) {
   match_whole_names(frame)
   check_no_steps(...names(), frame)
-  values <- lapply(rlang::set_names(ls(frame)), function(name) eval(as.name(name), frame))
-  env <- values$env
-  values <- Filter(Negate(is.null), values[names(values) != "env"])
-  # The default of a learner's argument gives way to a preset.
-  is_default <- function(name) eval(call("missing", as.name(name)), frame)
-  by_default <- vapply(names(values), is_default, NA)
-  given <- values[!by_default]
-  defaults <- values[by_default]
   dots <- list(...)
+  check_dots_named(dots, "iterations = 100", frame)
   check_environment(env, "env", frame)
   of_agent <- names(formals(make))
   of_training <- names(formals(train_agent))
-  kwargs <- dots[!names(dots) %in% of_training]
+  kwargs <- dots[!names(dots) %in% c(of_agent, of_training)]
+  # An argument of the agent that is NULL was not given.
+  optional <- names(dots) %in% c(of_agent, "policy", "iterations", "total_steps", "target",
+                                    "episodes")
+  given <- dots[!(optional & vapply(dots, is.null, NA))]
   preset <- find_preset(sub("agent_", "", make), env, kwargs)
-  own <- intersect(of_agent, names(given))
-  earlier <- if (!"policy" %in% of_agent) given$policy %||% dots$policy
+  earlier <- if (!"policy" %in% of_agent) given$policy
   goes_on <- goes_on_from(earlier, paste0("gym_", make))
-  arguments <- if (goes_on) {
-    # An earlier training goes on with its own settings, which defaults do not replace.
-    own_arguments(earlier$agent)
-  } else {
-    utils::modifyList(
-      defaults[intersect(of_agent, names(defaults))],
-      if (is.null(preset)) list() else preset_arguments(preset)
-    )
-  }
-  arguments <- replace_arguments(arguments, given[own])
+  # An earlier training goes on with its own settings.
+  arguments <- if (goes_on) own_arguments(earlier$agent) else preset_arguments(preset)
+  arguments <- replace_arguments(arguments, given[intersect(of_agent, names(given))])
   agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
-  training <- c(given[setdiff(names(given), of_agent)], dots[names(dots) %in% of_training])
+  training <- given[intersect(names(given), setdiff(of_training, of_agent))]
   # The user's budget replaces the preset's, and that of the earlier training.
   of_budget <- c("iterations", "total_steps")
   budget <- any(of_budget %in% names(training))
@@ -148,10 +141,10 @@ make_and_train <- function(make, frame, ...) {
     inform_of_preset(preset, env)
     agent <- with_preset(agent, preset, names(given))
   }
-  left <- setdiff(intersect(names(defaults), of_training), names(training))
-  training[left] <- defaults[left]
+  left <- setdiff(names(defaults), names(training))
   naming_own_call(
-    rlang::exec("train_agent", agent, env, !!!training, !!!kwargs), "train_agent", frame
+    rlang::exec("train_agent", agent, env, !!!training, !!!defaults[left], !!!kwargs),
+    "train_agent", frame
   )
 }
 

@@ -42,12 +42,11 @@
 #'   as `"action_mask"` of Taxi: a number for each action, 0 for an invalid one. The agent never
 #'   takes an action again at an observation where it was marked invalid, and its value is `-Inf`.
 #'   For tables only. `NULL`, the default, for none.
-#' @param env The environment, as for [train_agent()].
-#' @param iterations,total_steps,target The budget and the target, as for [train_agent()]. An
-#'   iteration has `episodes` episodes.
-#' @param episodes The number of episodes in an iteration, a whole number. The default is 10.
-#' @param ... Further arguments of [train_agent()], such as `seed` or `num_envs`, and of the
-#'   environment, such as `is_slippery = FALSE`.
+#' @param env The environment, as for [train_agent()]. If it is an id with a row in
+#'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
+#' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
+#'   `total_steps`, of which one is needed without a preset, `episodes` (in an iteration, 10 by
+#'   default), `target` or `seed`; and of the environment, such as `is_slippery = FALSE`.
 #' @return `agent_q()` returns an agent of class `gym_agent_q`. `learn_q()` makes this agent, trains
 #'   it and returns the result of [train_agent()]. Its `$policy` takes the action with the largest
 #'   value, and [state_values()] returns the values.
@@ -249,9 +248,6 @@ format.gym_agent_q <- function(x, ...) {
 
 #' @rdname agent_q
 #' @export
-learn_q <- function(env, iterations = NULL, total_steps = NULL, target = NULL, episodes = 10,
-                    discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                    initial = 0, features = NULL, double = FALSE, planning = 0, bonus = 0,
-                    mask = NULL, ...) {
-  make_and_train("agent_q", rlang::current_env(), ...)
+learn_q <- function(env, ...) {
+  make_and_train("agent_q", env, ..., defaults = list(episodes = 10))
 }

@@ -152,11 +152,6 @@ format.gym_agent_reinforce <- function(x, ...) {
 
 #' @rdname agent_reinforce
 #' @export
-learn_reinforce <- function(env = "CartPole-v1", policy = NULL, batch_steps = NULL,
-                            learning_rate = NULL, gamma = NULL, baseline = NULL,
-                            value_learning_rate = NULL, value_updates = NULL, entropy = NULL,
-                            normalize_advantages = NULL, max_grad_norm = NULL,
-                            min_episodes = NULL, iterations = NULL, total_steps = NULL,
-                            target = NULL, ...) {
-  make_and_train("agent_reinforce", rlang::current_env(), ...)
+learn_reinforce <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_reinforce", env, policy = policy, ...)
 }

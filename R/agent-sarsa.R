@@ -99,9 +99,6 @@ format.gym_agent_sarsa <- function(x, ...) {
 
 #' @rdname agent_sarsa
 #' @export
-learn_sarsa <- function(env, iterations = NULL, total_steps = NULL, target = NULL, episodes = 10,
-                        discount = 0.99, learning_rate = 0.1, epsilon = 0.1, temperature = NULL,
-                        initial = 0, features = NULL, expected = FALSE, n = 1, lambda = 0,
-                        mask = NULL, ...) {
-  make_and_train("agent_sarsa", rlang::current_env(), ...)
+learn_sarsa <- function(env, ...) {
+  make_and_train("agent_sarsa", env, ..., defaults = list(episodes = 10))
 }

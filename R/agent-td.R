@@ -13,10 +13,10 @@
 #'   how much more likely `policy` is to take its action (off-policy learning by importance
 #'   sampling; sections 5.5 and 11.1). The probabilities of both must be known: use a
 #'   [policy_table()] or a [policy_random()]. `NULL`, the default, for none.
-#' @param iterations,total_steps The budget, as for [train_agent()]. An iteration has `episodes`
-#'   episodes.
-#' @param target The mean return at which training ends. By default there is none, because learning
-#'   values does not change the return.
+#' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
+#'   `total_steps`, of which one is needed, `episodes` (in an iteration, 10 by default) or `seed`;
+#'   and of the environment. By default there is no `target`, because learning values does not
+#'   change the return.
 #' @return `agent_td()` returns an agent of class `gym_agent_td`. `learn_td()` makes this agent,
 #'   trains it and returns the result of [train_agent()]. [state_values()] returns the values.
 #' @inheritSection agent_q Errors
@@ -184,8 +184,8 @@ format.gym_agent_td <- function(x, ...) {
 
 #' @rdname agent_td
 #' @export
-learn_td <- function(env, policy, iterations = NULL, total_steps = NULL, episodes = 10,
-                     discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL, n = 1,
-                     lambda = 0, behavior = NULL, target = Inf, ...) {
-  make_and_train("agent_td", rlang::current_env(), ...)
+learn_td <- function(env, policy, ...) {
+  make_and_train(
+    "agent_td", env, policy = policy, ..., defaults = list(episodes = 10, target = Inf)
+  )
 }

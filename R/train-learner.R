@@ -135,7 +135,7 @@ plays_whole <- function(agent) {
 
 # Whether Monte Carlo with these arguments needs nothing but the steps of whole episodes.
 learns_whole <- function(mask, exploring_starts, importance) {
-  is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L], "none")
+  is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L] %||% "none", "none")
 }
 
 # Whether the agent learns during play in this training; asked once.
