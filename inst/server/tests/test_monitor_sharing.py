@@ -63,7 +63,7 @@ def test_each_of_several_has_a_directory_of_its_own(take, monitor_dir, options):
 
 def test_force_removes_what_those_left_that_are_gone_and_nothing_of_the_living(take, monitor_dir):
     one, two = play(take(ONE), 0), play(take(TWO), 0, 1)
-    play(take(THREE), 0).release()
+    play(take(THREE), 0).table.close()
     (three := monitor_dir / "run" / THREE / "notes.txt").write_text("mine")
     take("44444444", force=True)
     assert set(of("", 0) + of(TWO, 0, 1)) < set(files(monitor_dir))
@@ -91,28 +91,17 @@ def test_what_is_left_behind_is_kept_unless_the_client_decides(take, monitor_dir
 
 
 def test_resume_goes_on_where_the_first_one_stopped(take):
-    play(take(ONE), 0, 1, 2).release()
+    play(take(ONE), 0, 1, 2).table.close()
     assert take(TWO, resume=True).next_episode == 3
     assert take(THREE, resume=True).next_episode == 0
 
 
 def test_resume_goes_on_with_ones_own_files(take, monitor_dir):
     one = take(ONE)
-    play(take(TWO), 0, 1).release()
-    one.release()
+    play(take(TWO), 0, 1).table.close()
+    one.table.close()
     again = take(TWO, resume=True)
     assert (again.path, again.next_episode) == (monitor_dir / "run" / TWO, 2)
-
-
-def test_what_was_deleted_under_a_monitor_does_not_spoil_the_next_one(take, monitor_dir):
-    one = play(take(ONE), 0)
-    for path in (monitor_dir / "run").iterdir():
-        path.unlink()
-    two = play(take(TWO), 0, 1)
-    with pytest.raises(FileNotFoundError):
-        one.release()
-    two.release()
-    assert files(monitor_dir) == of("", 0, 1)
 
 
 HOLD = """

@@ -87,7 +87,7 @@ class Monitor:
         """
         self._finish_video()
         try:
-            self._directory.release()
+            self._directory.table.close()
         except OSError as error:
             self._remember(error)
         if self._failure is not None:

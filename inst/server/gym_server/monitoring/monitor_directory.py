@@ -9,8 +9,8 @@ import re
 import sys
 import tempfile
 import threading
-from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import IO, TextIO
+from pathlib import Path
+from typing import TextIO
 
 from gym_server.errors import GymServerError
 from gym_server.json_values import brief
@@ -18,14 +18,11 @@ from gym_server.json_values import brief
 TABLE = "episodes.csv"
 _HEADER = "episode,return,length,seconds\n"
 
-# The names of Gymnasium's RecordVideo.
-_VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
-
 # The subdirectory of a monitor that shares its directory with another one.
 _INSTANCE_ID = re.compile("[0-9a-f]{8}")
 
-# Monitors never count higher, and file names could become too long.
-_MOST_EPISODES = 10**15
+# The names of Gymnasium's RecordVideo.
+_VIDEO = re.compile(r"rl-video-episode-(\d+)\.mp4")
 
 
 class MonitorRoot:
@@ -55,8 +52,6 @@ class MonitorRoot:
         Raises:
             GymServerError: ``monitor_directory`` if monitors may not write there.
         """
-        if ".." in PurePosixPath(directory).parts or ".." in PureWindowsPath(directory).parts:
-            raise _refuse(directory, "it contains '..'")
         try:
             # Resolve links before comparing, so that none leads outside.
             own = self._find_root()
@@ -90,57 +85,34 @@ class MonitorDirectory:
     Attributes:
         path: the directory.
         next_episode: the number of the next episode.
-        table: the table, open for appending, after ``take()``.
+        table: the table, open for appending.
+        is_free: whether no active monitor had it.
     """
 
-    table: TextIO
-
     def __init__(self, path: Path) -> None:
-        """Set the path; ``take()`` takes the directory."""
-        self.path = path
-        self.next_episode = 0
-        self._is_new = False
-
-    def take(self) -> bool:
-        """Lock the directory's table; return False if an active monitor has it.
+        """Open the directory's table, and lock it.
 
         Raises:
             OSError: the table cannot be opened or locked.
         """
-        path = self.path / TABLE
-        while True:
-            self._is_new = not path.exists()
-            with contextlib.ExitStack() as undo:
-                table = undo.enter_context(
-                    open(path, "a+", encoding="ascii", errors="replace", newline="")
-                )
-                if not _try_lock(table):
-                    return False
-                # Otherwise another monitor deleted the file after it was opened here.
-                if _is_at(table, path):
-                    undo.pop_all()
-                    self.table = table
-                    return True
+        path.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self.next_episode = 0
+        self.table: TextIO = open(  # noqa: SIM115
+            path / TABLE, "a+", encoding="ascii", errors="replace", newline=""
+        )
+        try:
+            self.is_free = _try_lock(self.table)
+        except OSError:
+            self.leave()
+            raise
 
     def leave(self) -> None:
-        """Restore the directory as it was before ``take()``."""
-        # Unlink while it is locked, so that no other monitor has it. Windows cannot delete open
-        # files.
-        if os.name == "nt":
-            self.table.close()
-        if self._is_new:
-            (self.path / TABLE).unlink(missing_ok=True)
+        """Leave the directory as it was."""
+        is_empty = not self._size
         self.table.close()
-
-    def release(self) -> None:
-        """Finish the table.
-
-        Raises:
-            OSError: it was removed, or cannot be written.
-        """
-        with self.table:
-            if not _is_at(self.table, self.path / TABLE):
-                raise FileNotFoundError(f"{TABLE} was removed")
+        if is_empty:
+            (self.path / TABLE).unlink(missing_ok=True)
 
     def prepare(self, force: bool, resume: bool) -> None:
         """Keep, delete or refuse an earlier monitor's files; then start the table.
@@ -149,12 +121,10 @@ class MonitorDirectory:
             OSError: something cannot be read, written or deleted.
             GymServerError: ``monitor_directory``.
         """
-        videos = self.videos()
         if force:
-            for name in videos:
-                (self.path / name).unlink()
-            self.table.truncate(0)
-        elif self._size and not resume:
+            self.empty()
+        videos = self.videos()
+        if self._size and not resume:
             raise _refuse(
                 self.path,
                 "it holds the files of an earlier monitor",
@@ -168,13 +138,10 @@ class MonitorDirectory:
             self.table.flush()
 
     def empty(self) -> None:
-        """Delete the files of a monitor that has ended, and the directory if it is then empty."""
+        """Delete the files of a monitor that has ended."""
         for name in self.videos():
             (self.path / name).unlink()
-        self._is_new = True
-        self.leave()
-        with contextlib.suppress(OSError):
-            self.path.rmdir()
+        self.table.truncate(0)
 
     def videos(self) -> dict[str, str]:
         """Return the names of earlier videos, each with its episode's number.
@@ -204,7 +171,7 @@ class MonitorDirectory:
         """Return the episode numbers in the table, whose header was already read."""
         try:
             numbers = [int(line.split(",")[0]) for line in self.table.read().splitlines() if line]
-            if not all(0 <= number <= _MOST_EPISODES for number in numbers):
+            if min(numbers, default=0) < 0:
                 raise ValueError("it holds a value that is not an episode's number")
         except ValueError as error:
             raise _refuse(
@@ -231,9 +198,17 @@ def take_directory(
     Raises:
         GymServerError: ``monitor_directory``.
     """
+    own = path / instance_id
+    # An instance continues in its own subdirectory if it has one.
+    places = (own, path) if resume and not force and own.exists() else (path, own)
     try:
-        path.mkdir(parents=True, exist_ok=True)
-        taken = _take(path, path / instance_id, resume and not force)
+        for place in places:
+            taken = MonitorDirectory(place)
+            if taken.is_free:
+                break
+            taken.table.close()
+        else:
+            raise _refuse(path, "another monitor writes there")
         try:
             taken.prepare(force, resume)
             if force and taken.path == path:
@@ -246,23 +221,14 @@ def take_directory(
     return taken
 
 
-def _take(path: Path, own: Path, resume: bool) -> MonitorDirectory:
-    # An instance continues in its own subdirectory if it has one.
-    for one in (own, path) if resume and own.exists() else (path, own):
-        one.mkdir(exist_ok=True)
-        taken = MonitorDirectory(one)
-        if taken.take():
-            return taken
-    raise _refuse(path, "another monitor writes there")
-
-
 def _empty_those_of_gone_monitors(path: Path) -> None:
-    for one in [path / name for name in os.listdir(path) if _INSTANCE_ID.fullmatch(name)]:
-        other = MonitorDirectory(one)
-        # A monitor that is just starting has locked its table before it writes to it.
-        has_begun = (one / TABLE).exists() and (one / TABLE).stat().st_size > 0
-        if has_begun and other.take():
+    for name in filter(_INSTANCE_ID.fullmatch, os.listdir(path)):
+        other = MonitorDirectory(path / name)
+        if other.is_free:
             other.empty()
+        other.leave()
+        with contextlib.suppress(OSError):
+            other.path.rmdir()
 
 
 def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServerError:
@@ -272,14 +238,6 @@ def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServe
         f"The directory {brief(str(directory))} cannot be used: {reason}",
         hint or "name a directory relative to the server's --monitor-dir, such as 'cartpole-1'",
     )
-
-
-def _is_at(file: TextIO, path: Path) -> bool:
-    """Return whether an open file is the one at a path."""
-    try:
-        return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
-    except FileNotFoundError:
-        return False
 
 
 if sys.platform == "win32":
@@ -304,7 +262,7 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def _try_lock(file: IO) -> bool:
+def _try_lock(file: TextIO) -> bool:
     """Lock an open file until it is closed; return False if it is already locked.
 
     Raises:
