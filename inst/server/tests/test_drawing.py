@@ -140,7 +140,8 @@ def test_mujoco_warns_in_the_log_and_leaves_no_file(
 
     for _ in range(2):
         mujoco.get_mju_user_warning()("the model is odd")
-    assert [(one.name, one.message) for one in caplog.records] == [("MuJoCo", "the model is odd")]
+    said = [(one.name, one.message) for one in caplog.records]
+    assert said.count(("MuJoCo", "the model is odd")) == 1
     assert list(tmp_path.glob("MUJOCO*")) == []
 
 

@@ -30,7 +30,6 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.threads.lock import InstanceLock
 from gym_server.viewing.observation_summary import entries
 from gym_server.viewing.viewer import Viewer, usable_fps
-from gym_server.viewing.watchable import Watchable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 Seed = int | tuple[int | tuple[int, ...] | None, ...] | None
 
 
-class Instance(Watchable):
+class Instance:
     """An environment that a client created; ``SingleInstance`` or ``VectorInstance``.
 
     Every method that resets, steps or draws the environment waits for its lock. If the instance is
@@ -56,6 +55,8 @@ class Instance(Watchable):
         statistics: the statistics of its episodes.
         viewer: shows it to watchers.
         steps: the number of steps of its sub-environments.
+        resets_and_steps: how many resets and steps have started.
+        draws_when_stepped: whether its steps run on the render thread.
         was_reset: whether an episode has begun.
         created: when it was created, in the clock's seconds.
         monitor: records its episodes, or None.
@@ -75,6 +76,8 @@ class Instance(Watchable):
     vectorization_mode: str | None = None
     num_workers: int | None = None
     autoreset_mode: str | None = None
+    draws_when_stepped: bool
+    resets_and_steps = 0
 
     def __init__(self, env: Any, config: EnvConfig, renderer: RenderThread) -> None:
         """Take over an environment; subclasses set the spaces first.
@@ -270,7 +273,7 @@ class Instance(Watchable):
         raise NotImplementedError
 
     def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
-        """Return what a watcher sees of a sub-environment; see ``Watchable.look()``."""
+        """Return what a watcher sees of a sub-environment; see ``viewing.viewer.Watchable``."""
         facts = {
             "env_id": self.env_id,
             "sub_env": sub_env,

@@ -39,7 +39,6 @@ class SingleInstance(Instance):
         self.single_observation_space = env.observation_space
         super().__init__(env, config, renderer)
         self.draws_when_stepped = draws_when_stepped(env)
-        self.draws_on_render_thread = env.render_mode == "rgb_array"
         self.drawing = Drawing(renderer, self.draws_when_stepped)
         self.statistics = EpisodeStatistics()
 

@@ -58,7 +58,6 @@ class VectorInstance(Instance):
         self.autoreset_mode = env.autoreset_mode.value
         self.draws_when_stepped = env.draws_when_stepped
         self.drawing = env.drawing
-        self.draws_on_render_thread = env.render_mode == "rgb_array" and env.draws_in_process
         self.statistics = VectorEpisodeStatistics(env.num_envs, env.autoreset_mode)
 
     # Reset ----------------------------------------------------------------------------------

@@ -7,26 +7,17 @@ drawing, and closing of what was drawn, runs here, and pygame ends with the proc
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, wait
+from collections.abc import Callable
+from concurrent.futures import Future
 from typing import TypeVar
 
 from gym_server import memory
 from gym_server.threads import calls
 
 ResultT = TypeVar("ResultT")
-
-
-# How often a thread that waits for its turn asks whether to keep waiting.
-_POLL_SECONDS = 0.02
-
-
-class Occupied(Exception):  # noqa: N818
-    """The render thread is busy with other work."""
 
 
 class _Job:
@@ -59,39 +50,6 @@ class RenderThread:
         if threading.current_thread() is self._thread:
             # Drawing may call for drawing, for example in a monitored environment.
             return draw(*args)
-        with self._job(draw, *args) as job:
-            result: ResultT = job.future.result()
-            return result
-
-    def close(self, close: Callable[[], object], drawn: bool) -> None:
-        """Close an environment: on the render thread if it has drawn, else in this thread."""
-        if drawn:
-            self.run(close)
-        else:
-            _keep_pygame_and(close)
-
-    def run_while(
-        self, may_wait: Callable[[], bool], draw: Callable[..., ResultT], *args: object
-    ) -> ResultT:
-        """Run a function on the render thread, unless its turn takes too long to come.
-
-        Args:
-            may_wait: returns whether to keep waiting; called every 20 ms until the function starts.
-            draw: the function.
-            *args: its arguments.
-
-        Raises:
-            Occupied: its turn did not come, and it will not run.
-        """
-        with self._job(draw, *args) as job:
-            while not wait([job.future], _POLL_SECONDS).done:
-                if not may_wait() and job.future.cancel():
-                    raise Occupied
-            result: ResultT = job.future.result()
-            return result
-
-    @contextlib.contextmanager
-    def _job(self, draw: Callable, *args: object) -> Iterator[_Job]:
         with calls.waiting() as describe:
             job = _Job(lambda: _keep_pygame_and(draw, *args), describe or (lambda: "Drawing"))
             with self._lock:
@@ -103,13 +61,20 @@ class RenderThread:
                     memory.start(thread)
                     self._thread = thread
                 self._queue.put(job)
-            yield job
+            result: ResultT = job.future.result()
+            return result
+
+    def close(self, close: Callable[[], object], drawn: bool) -> None:
+        """Close an environment: on the render thread if it has drawn, else in this thread."""
+        if drawn:
+            self.run(close)
+        else:
+            _keep_pygame_and(close)
 
     def _work(self) -> None:
         while (job := self._queue.get()) is not None:
-            if job.future.set_running_or_notify_cancel():
-                with calls.call(job.describe):
-                    _do(job)
+            with calls.call(job.describe):
+                _do(job)
             # Do not keep the picture until the next job comes.
             job = None
 

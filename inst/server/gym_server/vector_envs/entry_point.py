@@ -44,7 +44,6 @@ class EntryPointEnv:
 
     runs_each = False
     draws_when_stepped = False
-    draws_in_process = True
     num_workers = None
     moved = None
 

@@ -47,7 +47,6 @@ class SubEnvs:
         ended: which of them have ended and do not move until they are reset.
         moved: which rows of the last step moved; None for all.
         draws_when_stepped: whether its steps must run on the render thread.
-        draws_in_process: whether sub-environments draw in this process.
         metadata, render_mode: as in Gymnasium.
         spec: the environment's spec, set by the function that makes it.
         single_observation_space, single_action_space: the spaces of one sub-environment.
@@ -118,7 +117,7 @@ class SubEnvs:
             self._describe(one, one.render_mode)
         finally:
             self._renderer.close(one.close, draws_when_stepped(one))
-        self.draws_when_stepped = self.draws_in_process = False
+        self.draws_when_stepped = False
 
     def _describe(self, env: Any, render_mode: str | None) -> None:
         self.metadata = {**(env.metadata or {}), "autoreset_mode": self.autoreset_mode}
@@ -128,7 +127,6 @@ class SubEnvs:
         self.observation_space = batch_space(env.observation_space, self.num_envs)
         self.action_space = batch_space(env.action_space, self.num_envs)
         self.draws_when_stepped = draws_when_stepped(env)
-        self.draws_in_process = True
 
     def _start(self, sub_env: SubEnv, groups: Sequence[range]) -> None:
         try:

@@ -11,13 +11,15 @@ from __future__ import annotations
 import base64
 import threading
 import time
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from gym_server.errors import GymServerError
 from gym_server.protocol.answers import dumps
 from gym_server.rendering.png import png
-from gym_server.viewing.capture import Busy, capture
-from gym_server.viewing.watchable import Watchable
+from gym_server.threads.lock import InstanceLock
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # The shortest time between two frames of an environment, however many watch it.
 _LEAST_SECONDS = 1 / 30
@@ -29,6 +31,9 @@ _PACED_SHARE = 0.5
 
 # A watcher gets a response after this long even if nothing has happened; proxies wait longer.
 _LONGEST_WAIT = 15.0
+
+# A watcher that waits longer than this for a step gets the answer "busy".
+_LOCK_TIMEOUT = 2.0
 
 # How long after its last request a watcher counts as watching.
 _STAYS_SECONDS = 2.0
@@ -43,6 +48,30 @@ def usable_fps(fps: object) -> float:
     if isinstance(fps, (int, float)) and 1 / _LONGEST_PACE <= fps <= 10_000:
         return float(fps)
     return _USUAL_FPS
+
+
+class Watchable(Protocol):
+    """An environment that can be watched.
+
+    Attributes:
+        lock: the lock for playing the environment or looking at it.
+        resets_and_steps: how many resets and steps have started.
+    """
+
+    lock: InstanceLock
+    resets_and_steps: int
+
+    def look(self, sub_env: int) -> tuple[dict, np.ndarray | None]:
+        """Return what a watcher sees of a sub-environment; the caller holds the lock.
+
+        Returns:
+            JSON values, and the frame or None. Without a frame the values include the observation
+            and the reason.
+        """
+
+
+class _Busy(Exception):  # noqa: N818
+    """A step takes too long to draw anything."""
 
 
 class _Frame(NamedTuple):
@@ -96,29 +125,29 @@ class Viewer:
             while True:
                 self.note_presence()
                 with self._drawing:
-                    frame = self._look(sub_env, after, deadline)
+                    frame = self._newer(sub_env, after, deadline)
                 if frame is not None:
                     return frame.body
                 self._ending.wait(_LEAST_SECONDS)
-        except Busy:
+        except _Busy:
             self.note_presence()
             return dumps({"number": after, "state": "busy"})
 
-    def _look(self, sub_env: int, after: int | None, deadline: float) -> _Frame | None:
+    def _newer(self, sub_env: int, after: int | None, deadline: float) -> _Frame | None:
         """Return the frame for a watcher; None if there is nothing new yet."""
         last = self._last if self._last is not None and self._last.sub_env == sub_env else None
         number, now = self._watchable.resets_and_steps, time.monotonic()
         is_stale = last.number != number if last is not None else after != number
         if is_stale and now >= self._due:
-            return self._draw(sub_env, deadline)
+            return self._draw(sub_env)
         if last is not None and (last.number != after or now >= deadline):
             return last
         if now < deadline:
             return None
         if now < self._due:
             # No frame was ever drawn.
-            raise Busy
-        return self._draw(sub_env, deadline)
+            raise _Busy
+        return self._draw(sub_env)
 
     def note_presence(self) -> None:
         """Count a watcher as watching for a while, without sending a frame."""
@@ -133,21 +162,27 @@ class Viewer:
 
     # Drawing --------------------------------------------------------------------------------
 
-    def _draw(self, sub_env: int, deadline: float) -> _Frame:
-        captured = capture(self._watchable, sub_env, deadline, self._may_wait_until)
-        facts, frame = captured.facts, captured.frame
+    def _draw(self, sub_env: int) -> _Frame:
+        lock = self._watchable.lock
+        deadline = time.monotonic() + _LOCK_TIMEOUT
+        # Wait briefly each time, so that a step that hangs does not delay the end of the server.
+        while not lock.acquire(0.1):
+            if self._ended is not None or time.monotonic() > deadline:
+                raise _Busy
+        began = time.monotonic()
+        try:
+            number = self._watchable.resets_and_steps
+            facts, frame = self._watchable.look(sub_env)
+        finally:
+            lock.release()
+        share = _PACED_SHARE if self._next_tick > began - 1 else _SHARE
+        # The first frame takes longer, because the environment loads fonts and colours.
+        wait = (time.monotonic() - began) / share if self._last is not None else 0.0
+        self._due = began + max(_LEAST_SECONDS, wait)
         # Encode without the lock, so that the environment can continue.
         facts["frame"] = None if frame is None else base64.b64encode(png(frame)).decode("ascii")
-        share = _PACED_SHARE if self._next_tick > captured.began - 1 else _SHARE
-        # The first frame takes longer, because the environment loads fonts and colours.
-        wait = captured.seconds / share if self._last is not None else 0.0
-        self._due = captured.began + max(_LEAST_SECONDS, wait)
-        number = captured.resets_and_steps
         self._last = _Frame(sub_env, number, dumps({"number": number, **facts}))
         return self._last
-
-    def _may_wait_until(self, deadline: float) -> bool:
-        return self._ended is None and time.monotonic() < deadline
 
     # For the instance -----------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pictures import decode
 
-from gym_server.viewing import capture, viewer
+from gym_server.viewing import viewer
 
 
 def state(client, url, **query):
@@ -245,7 +245,7 @@ def test_slow_drawing_leaves_most_of_the_time_to_the_steps(client, faulty, watch
 
 
 def test_a_step_that_takes_long_is_told(client, app, faulty, monkeypatch):
-    monkeypatch.setattr(capture, "_LOCK_TIMEOUT", 0.2)
+    monkeypatch.setattr(viewer, "_LOCK_TIMEOUT", 0.2)
     url = faulty("Counting", seconds=1.0)
     client.post(f"{url}/reset/")
     thread, _ = in_background(play, app.test_client(), url)
@@ -264,6 +264,84 @@ def test_one_never_drawn_whose_turn_is_far_off_is_told_in_time(client, faulty, w
     thread, seen = in_background(state, client.application.test_client(), url)
     thread.join(5)
     assert seen == [{"number": None, "state": "busy"}]
+
+
+# While others draw ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def occupied(app, client, faulty, watch):
+    """Let another environment draw until the test calls the returned function."""
+    url = faulty("Drawing")
+    instance, _ = watch(url)
+    begun, over = threading.Event(), threading.Event()
+    draw = instance.draw
+
+    def for_long():
+        begun.set()
+        over.wait(30)
+
+    instance.draw = lambda sub_env: instance.renderer.run(for_long) or draw(sub_env)
+    client.post(f"{url}/reset/")
+    threads = []
+
+    def occupied():
+        threads.append(in_background(state, app.test_client(), url)[0])
+        assert begun.wait(5)
+        return over.set
+
+    yield occupied
+    over.set()
+    for thread in threads:
+        thread.join(5)
+
+
+@pytest.mark.parametrize("made", [{}, {"num_envs": 2, "vectorization_mode": "async"}])
+def test_who_needs_no_drawing_here_does_not_wait_for_others(
+    client, app, faulty, create, occupied, made
+):
+    url = create(**made) if made else faulty("Counting")
+    client.post(f"{url}/reset/")
+    occupied()
+    watcher, seen = in_background(state, app.test_client(), url)
+    watcher.join(5)
+    assert seen[0]["state"] == "running"
+
+
+@pytest.mark.parametrize(
+    "made", [{}, *({"num_envs": 2, "vectorization_mode": mode} for mode in ("sync", "async"))]
+)
+def test_what_was_never_drawn_is_made_and_closed_while_others_draw(client, create, occupied, made):
+    occupied()
+    closing, closed = in_background(lambda: client.post(f"{create(**made)}/close/"))
+    closing.join(5)
+    assert closed[0].status_code == 204
+
+
+@pytest.mark.parametrize("seconds", [0.0, pytest.param(0.05, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("draws_when_stepped", [False, True])
+def test_who_is_stepped_all_the_time_is_seen(
+    app, client, faulty, watch, draws_when_stepped, seconds
+):
+    over = threading.Event()
+
+    def play_on(url):
+        player = app.test_client()
+        while not over.is_set():
+            play(player, url)
+
+    urls = [faulty("Drawing", seconds=seconds, length=10**6) for _ in range(2)]
+    for url in urls:
+        watch(url)[0].draws_when_stepped = draws_when_stepped
+        client.post(f"{url}/reset/")
+    players = [in_background(play_on, url)[0] for url in urls]
+    numbers, end = {0}, time.monotonic() + 60
+    while len(numbers) < 5 and time.monotonic() < end:
+        numbers.add(state(client, urls[0], after=max(numbers))["number"])
+    over.set()
+    for player in players:
+        player.join(5)
+    assert len(numbers) == 5
 
 
 # The end ------------------------------------------------------------------------------------
