@@ -28,17 +28,6 @@ new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALS
   sub_env
 }
 
-#' Convert integer64 in the results of a user's functions to plain numbers
-#' @param functions A list of `reset` and `step`.
-#' @noRd
-plain_results <- function(functions) {
-  reset <- functions$reset
-  step <- functions$step
-  functions$reset <- function(seed, options) narrow_values(reset(seed, options))
-  functions$step <- function(action) plain_step(step(action))
-  functions
-}
-
 #' Start an episode
 #'
 #' @param seed The seed of its generator; `NULL` continues the generator. An environment that was
@@ -208,7 +197,7 @@ checked_action <- function(traits, action, which, call) {
 #' @noRd
 tidy_value <- function(space, value, n) {
   if (inherits(space, "gym_space_discrete")) {
-    return(narrow_if_double(value))
+    return(narrow_whole(value))
   }
   if (inherits(space, "gym_space_array") && length(space$shape) == 1L) {
     if (is.null(n)) {
@@ -226,10 +215,6 @@ tidy_value <- function(space, value, n) {
   value
 }
 
-narrow_if_double <- function(x) {
-  if (is.object(x) || is.integer(x)) unname(x) else narrow_whole(x)
-}
-
 #' Make a function that takes one action from a checked batch
 #' @noRd
 action_picker <- function(space) {
@@ -245,7 +230,7 @@ action_picker <- function(space) {
 # TRUE counts as 1 for Discrete actions.
 tidy_actions <- function(space, action) {
   if (inherits(space, "gym_space_discrete")) {
-    narrow_if_double(action)
+    narrow_whole(action)
   } else {
     if (is.array(action) && !is.null(dimnames(action))) {
       dimnames(action) <- NULL

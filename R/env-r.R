@@ -163,7 +163,6 @@ r_env <- R6Class(
     },
     reset = function(seed = NULL, options = NULL, return_info = FALSE) {
       check_sub_env_open(private$sub_env)
-      seed <- plain_numbers(seed)
       check_seed(seed, min = 0)
       check_flag(return_info)
       if (!is.null(options)) {
@@ -224,7 +223,6 @@ definition_sub_env <- function(definition, num_envs = NULL) {
     },
     step = function(action) step(self, action)
   )
-  functions <- plain_results(functions)
   for (wrap_around in definition$wrappers) {
     functions <- wrap_around(functions, num_envs)
   }
@@ -259,7 +257,7 @@ step_r_env <- function(sub_env, action, call = rlang::caller_env()) {
   traits <- sub_env$traits
   which <- if (!is.null(sub_env$num_envs)) seq_len(sub_env$num_envs)
   check_was_reset(sub_env, call)
-  action <- checked_action(traits, narrow_values(action), which, call)
+  action <- checked_action(traits, action, which, call)
   out <- complete_step(raw_step(sub_env, action, call), sub_env, call = call)
   if (isTRUE(all(sub_env$ended))) {
     # NA: the episode is over, and the warning has been given.

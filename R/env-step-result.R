@@ -12,7 +12,7 @@ first_observation <- function(env, seed, ...) {
     if (is.list(seed)) class(seed) <- "gym_seed_lists"
     env$reset(seed = seed, ..., infos = FALSE)
   } else {
-    narrow_values(env$reset(seed = seed, ...))
+    plain_numbers(env$reset(seed = seed, ...), "observation", NULL)
   }
 }
 
@@ -27,22 +27,9 @@ take_step <- function(env, n, action, which = NULL, finals = TRUE) {
   }
   out <- if (is.null(which)) env$step(action) else env$step(action, which = which)
   if (!inherits(env, "gym_r_env")) {
-    out <- plain_step(out)
+    plain_numbers(out, "step()", NULL)
     where <- "`step()` of this environment"
     check_step_parts(out, n, where, NULL, needed = c("observation", "reward", flags))
-  }
-  out
-}
-
-# The result of a step, with integer64 converted to plain numbers. It runs in each step, so values
-# without a class are skipped at once.
-plain_step <- function(out) {
-  if (is.list(out)) {
-    for (name in c("observation", "next_observation")) {
-      value <- out[[name]]
-      if (is.object(value) || is.list(value)) out[name] <- list(narrow_values(value))
-    }
-    if (is_integer64(out$reward)) out$reward <- plain_numbers(out$reward, "reward", NULL)
   }
   out
 }
@@ -181,8 +168,9 @@ check_step_parts <- function(out, n, where, call,
 wrong_parts <- function(out, n, finite = FALSE) {
   reward <- out$reward
   right <- c(
-    reward = (is.numeric(reward) || is.logical(reward)) && length(reward) == n &&
-      !anyNA(reward) && (!finite || is.numeric(reward) && all(is.finite(reward))),
+    reward = (is.numeric(reward) || is.logical(reward)) && !is_integer64(reward) &&
+      length(reward) == n && !anyNA(reward) &&
+      (!finite || is.numeric(reward) && all(is.finite(reward))),
     terminated = is_flags(out$terminated, n),
     truncated = is_flags(out$truncated, n),
     info = is.null(out$info) || is.list(out$info)

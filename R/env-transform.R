@@ -223,7 +223,7 @@ new_transform <- function(wrapper, func, traits, call) {
         class = c(own_classes(cnd), "gym_error_environment"), parent = cnd
       )
     })
-    fit(narrow_values(value), n)
+    fit(value, n)
   }
   transform$hint <- transform_hint(asked, traits$observation_space)
   calls <- 0

@@ -81,7 +81,7 @@ wrapped_server_env <- R6Class(
     # The actions as the wrapper's function gets them.
     take_action = function(action, which, call) {
       check_which(which, private$instance, call)
-      action <- numbered_actions(private$instance, narrow_values(action), call)
+      action <- numbered_actions(private$instance, action, call)
       if (!is.null(self$num_envs)) which <- which %||% seq_len(self$num_envs)
       checked_action(private$traits, action, which, call)
     },

@@ -143,8 +143,8 @@ check_numbers <- function(values, dtype, shape) {
       "A value of shape ", shape_text(shape), " has ", count_of(length(values), "number")
     ))
   }
-  # NaN is a number. Do not read the bits of an integer64 as a double.
-  missing <- !is.object(values) && anyNA(values) && any(is.na(values) & !is.nan(values))
+  # NaN is a number.
+  missing <- anyNA(values) && any(is.na(values) & !is.nan(values))
   if (!is.numeric(values) && !is.logical(values) || missing) {
     abort_answer(paste("A value contains something that is not", dtype %||% "number"))
   }

@@ -88,9 +88,7 @@ json_atoms <- function(x) {
   if (is.factor(x)) {
     x <- as.character(x)
   }
-  if (is_integer64(x)) {
-    return(ifelse(is.na(double_from_integer64(x)), "null", whole_text(x)))
-  }
+  plain_numbers(x, "value", NULL)
   switch(typeof(x),
     logical = ifelse(is.na(x), "null", ifelse(x, "true", "false")),
     integer = ,
@@ -194,21 +192,14 @@ whole_from_json <- function(json) {
     if (!all(grepl("^-?[0-9]+$", numbers))) {
       abort_answer(paste(describe_value(numbers), "is not a whole number"))
     }
-    return(whole_from_digits(rapply(as.list(json), whole_text, how = "unlist")))
+    numbers <- as.numeric(rapply(as.list(json), whole_text, how = "unlist"))
+    check_exact(numbers)
+    return(narrow_whole(numbers))
   }
   if (is.double(numbers)) {
     check_exact(numbers)
   }
   if (is.null(numbers)) integer() else numbers
-}
-
-# Refuses integers that the parser has rounded: those that int64 cannot represent, and the smallest
-# int64. Other integers beyond 2^53 are text here.
-check_exact <- function(numbers) {
-  lost <- abs(numbers) > 2^53
-  if (any(lost)) {
-    abort_whole(sprintf("%.0f", numbers[lost][[1L]]))
-  }
 }
 
 # Infos --------------------------------------------------------------------------

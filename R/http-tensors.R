@@ -52,7 +52,7 @@ read_entries <- function(bytes, layout) {
     } else {
       if (is.raw(values)) values <- as.integer(values)
       if (!is.null(entry$attributes)) {
-        attributes(values) <- c(entry$attributes, if (is.object(values)) list(class = "integer64"))
+        attributes(values) <- entry$attributes
       }
     }
     entries[[i]] <- values
@@ -65,7 +65,7 @@ read_entries <- function(bytes, layout) {
 place_by_row <- function(values, shape, labels = NULL) {
   if (is.raw(values)) {
     array(as.integer(shape_values(values, shape)), shape, labels)
-  } else if (is.object(values) || length(shape) > 2L) {
+  } else if (length(shape) > 2L) {
     shape_values(values, shape)
   } else {
     matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE, dimnames = labels)
@@ -109,7 +109,7 @@ write_numbers <- function(as_type, size) {
 }
 
 write_int32 <- function(x) {
-  writeBin(int32_bits(as_double(x) %% 2^32), raw(), size = 4L, endian = "little")
+  writeBin(int32_bits(as.double(x) %% 2^32), raw(), size = 4L, endian = "little")
 }
 
 write_half <- function(x) writeBin(half_from_double(x), raw(), size = 2L, endian = "little")

@@ -70,17 +70,14 @@ array_in_time <- function(space, values, cells) {
     names(parts) <- names(values[[1L]])
     return(map_parts(space, array_in_time, parts, list(cells)))
   }
-  wide <- any(vapply(values, inherits, NA, "integer64"))
   numbers <- matrix(
-    if (wide) unclass(bit64::NA_integer64_) else vector(typeof(values[[1L]]), 1L)[2L],
-    prod(cells$dim), prod(space$shape)
+    vector(typeof(values[[1L]]), 1L)[2L], prod(cells$dim), prod(space$shape)
   )
   for (i in seq_along(values)) {
-    batch <- if (wide) unclass(bit64::as.integer64(values[[i]])) else values[[i]]
-    numbers[cells$at[cells$to[[i]] - cells$counts[[i]] + seq_len(cells$counts[[i]])], ] <- batch
+    at <- cells$to[[i]] - cells$counts[[i]] + seq_len(cells$counts[[i]])
+    numbers[cells$at[at], ] <- values[[i]]
   }
-  numbers <- with_time(numbers, cells, space)
-  if (wide) structure(numbers, class = "integer64") else numbers
+  with_time(numbers, cells, space)
 }
 
 with_time <- function(numbers, cells, space = NULL) {

@@ -147,7 +147,7 @@ read_steps <- function(play, lengths, answer) {
   vector_env <- play$vector_env
   n <- sum(lengths)
   read <- function(space, name) {
-    narrow_values(from_tensors(batch_space(space, n), name, answer))
+    from_tensors(batch_space(space, n), name, answer)
   }
   observed <- vector_env$observation_space
   tensors <- answer$tensors

@@ -63,7 +63,7 @@ abort_about_one <- function(cnd, vector_env) {
 #' @noRd
 batch_actions <- function(actions, n, vector_env) {
   space <- vector_env$action_space
-  actions <- as_batch(space, narrow_values(actions))
+  actions <- as_batch(space, actions)
   if (!is.null(attributes(actions)) || is.list(actions)) {
     actions <- action_by_name(space, actions, vector_env$spec$id, vector_env$call)
   }

@@ -244,7 +244,7 @@ observed_action <- function(policy, observed, call) {
 model_columns <- function(policy, observation, arg, call) {
   space <- policy$observation_space
   if (is.data.frame(observation) && (takes_table(policy) || is.null(space))) {
-    return(list(columns = as.list(narrow_values(observation)), one = FALSE))
+    return(list(columns = as.list(plain_numbers(observation, arg, call)), one = FALSE))
   }
   check_was_played(policy, call)
   observed <- if (is_stackable(space) || is.data.frame(observation)) {

@@ -127,7 +127,7 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   policy$epsilon <- epsilon
   policy$init <- check_choice(init, c("uniform", "orthogonal"))
   if (!anyNA(sizes)) policy <- with_deviations(policy)
-  weights <- narrow_values(weights, function(x) plain_numbers(x, "weights"))
+  weights <- plain_numbers(weights)
   if (!is.null(weights)) {
     check_weights_fit(weights, policy)
     policy$weights <- weights

@@ -13,7 +13,7 @@
 #' @noRd
 observation_rows <- function(observation, space, n = NULL, arg = "observation",
                              call = rlang::caller_env()) {
-  observation <- narrow_values(observation, function(x) plain_numbers(x, arg, call))
+  plain_numbers(observation, arg, call)
   # The number of dimensions of an observation: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
   observation <- numbers_by_name(observation, space, n, arg, call)

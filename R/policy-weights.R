@@ -66,7 +66,7 @@ check_weights <- function(weights, sizes, bias = FALSE, name = "weights",
 }
 
 check_layer <- function(layer, wanted, bias, arg, call) {
-  if (!is.matrix(layer) || !is.numeric(layer) || is_integer64(layer)) {
+  if (!is.matrix(layer) || !is.numeric(layer)) {
     abort_argument(layer, "a numeric matrix", arg, call)
   }
   if (!identical(dim(layer), as.integer(wanted))) {

@@ -52,8 +52,7 @@ attempt_rows <- function(topic, what, rows) {
 
 # Packages that only some functions need.
 suggested_packages <- c(
-  magick = "animate()", png = "frames of rollouts",
-  sigmoid = "the scripts of the tutorial", bit64 = "integers beyond 2^53"
+  magick = "animate()", png = "frames of rollouts", sigmoid = "the scripts of the tutorial"
 )
 
 sitrep_r <- function() {

@@ -75,8 +75,8 @@ space_bounds.gym_space_box <- function(space) list(low = space$low, high = space
 
 #' @exportS3Method
 space_bounds.gym_space_multidiscrete <- function(space) {
-  start <- as_double(space$start)
-  list(low = start, high = start + (as_double(space$nvec) - 1))
+  start <- as.double(space$start)
+  list(low = start, high = start + (as.double(space$nvec) - 1))
 }
 
 #' @exportS3Method
@@ -110,7 +110,8 @@ decode_numbers <- function(dtype, json) {
 check_value.gym_space_array <- function(space, value, path, call, bounds = FALSE) {
   refuse <- function(problem, path) abort_space(space, value, problem, call, path)
   takes_logical <- space$dtype == "bool" || space$name %in% c("MultiBinary", "MultiDiscrete")
-  if (!is.numeric(value) && !(is.logical(value) && takes_logical)) {
+  numeric <- is.numeric(value) && !is_integer64(value)
+  if (!numeric && !(is.logical(value) && takes_logical)) {
     refuse(paste("A value of a", space$name, "is numeric"), path)
   }
   if (!identical(value_shape(value, space), space$shape)) {
@@ -152,7 +153,6 @@ value_shape <- function(value, space) {
 # Finds the first number that does not belong to the space: a missing one, or one with a fraction if
 # they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds refuse.
 wrong_number <- function(space, flat) {
-  flat <- double_from_integer64(flat)
   if (anyNA(flat)) {
     missing <- is.na(flat) & !is.nan(flat)
     if (any(missing)) {
@@ -168,14 +168,14 @@ wrong_number <- function(space, flat) {
 }
 
 out_of_bounds <- function(space, flat) {
-  given <- as_double(flat)
+  given <- as.double(flat)
   flat <- round_to_dtype(given, space$dtype)
   allowed <- allowed_bounds(space)
   outside <- !(flat >= allowed$low & flat <= allowed$high)
   outside <- is.na(outside) | outside
   if (any(outside)) {
     at <- which(outside)[[1L]]
-    bounds <- lapply(space_bounds(space), function(bound) as_double(rep_len(bound, at)[[at]]))
+    bounds <- lapply(space_bounds(space), function(bound) as.double(rep_len(bound, at)[[at]]))
     text <- lapply(c(given[[at]], bounds), format, digits = 15L)
     outside <- paste("outside of the bounds", text[[2L]], "and", text[[3L]])
     list(problem = paste0("There is a number ", outside, ": ", text[[1L]]), at = at,
@@ -232,7 +232,7 @@ write_value.gym_space_array <- function(space, value) {
 }
 
 number_text_json <- function(dtype, flat) {
-  whole <- dtype %in% integer_dtypes && !is.integer(flat) || is_integer64(flat)
+  whole <- dtype %in% integer_dtypes && !is.integer(flat)
   if (whole) whole_text(flat) else json_number(flat)
 }
 
@@ -255,14 +255,15 @@ draw_numbers <- function(dtype, low, high) {
 }
 
 draw_whole <- function(low, high) {
-  # The outermost doubles that bit64 can represent.
-  low <- pmax(low, -2^63 + 1024)
-  high <- pmin(high, 2^63 - 1024)
+  # Of an int64 only those that R can represent.
+  low <- pmax(low, pmin(1 - 2^53, high))
+  high <- pmin(high, pmax(2^53 - 1, low))
   width <- high - low
   narrow <- width < 2^53
   numbers <- floor(draw_between(low, high + narrow))
   numbers <- pmin(pmax(numbers, low), high)
-  if (all(abs(numbers) <= 2^53)) narrow_whole(numbers) else whole_from_digits(whole_text(numbers))
+  check_exact(numbers)
+  narrow_whole(numbers)
 }
 
 draw_between <- function(low, high) {

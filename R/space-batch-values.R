@@ -90,11 +90,6 @@ bind_batches <- function(space, each) {
     map_parts(space, bind_batches, parts)
   } else if (!is_stackable(space)) {
     do.call(c, each)
-  } else if (any(vapply(each, inherits, NA, "integer64"))) {
-    # Other values may be integer or double, because integer64 is only for numbers beyond 2^53.
-    digits <- unlist(lapply(each, function(batch) whole_text(row_major(batch))))
-    n <- length(digits) / prod(space$shape)
-    shape_values(whole_from_digits(digits), c(n, space$shape))
   } else if (is.null(dim(each[[1L]]))) {
     unlist(each)
   } else {
@@ -154,9 +149,6 @@ sample_batch <- function(space, n) {
 #' @return A matrix with numbers in row-major order in each row, as Gymnasium flattens them.
 #' @noRd
 number_rows <- function(batch) {
-  if (is_integer64(batch)) {
-    return(structure(number_rows(unclass(batch)), class = "integer64"))
-  }
   shape <- dim(batch)
   if (length(shape) == 2L) {
     batch

@@ -163,7 +163,8 @@ check_batch <- function(space, batch, values, n, call, sub_envs = NULL, bounds =
     problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
     abort_space(batch, values, problem, call)
   }
-  if (!is.na(given)) {
+  # A number of an integer64 loses the class.
+  if (!is.na(given) && !is_integer64(values)) {
     for (i in seq_len(n)) {
       sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
       check_batch_value(space, batch_value(space, values, i), sub_env, call, bounds)

@@ -16,14 +16,14 @@ space_label.gym_space_discrete <- function(space) {
 
 #' @exportS3Method
 space_bounds.gym_space_discrete <- function(space) {
-  start <- as_double(space$start)
-  list(low = start, high = start + (as_double(space$n) - 1))
+  start <- as.double(space$start)
+  list(low = start, high = start + (as.double(space$n) - 1))
 }
 
 #' @exportS3Method
 decode_value.gym_space_discrete <- function(space, json) {
   value <- whole_from_json(json)
-  if (!is_whole(space, value)) {
+  if (!is_whole(value)) {
     abort_answer(paste("A value of Discrete is", describe_value(value)))
   }
   value
@@ -35,7 +35,7 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
     # TRUE is 1 in R, as True is in Python.
     value <- as.integer(value)
   }
-  if (!is_whole(space, value)) {
+  if (!is_whole(value)) {
     abort_space(space, value, "A value of Discrete is one whole number", call, path)
   }
   wrong <- if (bounds) out_of_bounds(space, value)
@@ -45,20 +45,13 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
 }
 
 # Called in nearly every step: the usual case, the last one, is fast.
-is_whole <- function(space, value) {
-  if (length(value) != 1L || !is.numeric(value)) {
-    FALSE
-  } else if (is.object(value)) {
-    is.null(wrong_number(space, value))
-  } else {
-    is.finite(value) && value == trunc(value)
-  }
+is_whole <- function(value) {
+  length(value) == 1L && is.numeric(value) && !is.object(value) && is.finite(value) &&
+    value == trunc(value)
 }
 
 #' @exportS3Method
-write_value.gym_space_discrete <- function(space, value) {
-  if (is.object(value)) whole_text(value) else sprintf("%.0f", value)
-}
+write_value.gym_space_discrete <- function(space, value) sprintf("%.0f", value)
 
 #' @exportS3Method
 space_sample.gym_space_discrete <- function(space) {

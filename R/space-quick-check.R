@@ -76,7 +76,7 @@ has_batch_shape <- function(values, n, shape) {
 quick_bounds <- function(space) {
   each <- prod(space$shape)
   bounds <- lapply(allowed_bounds(space), function(bound) {
-    as.vector(shape_values(rep(as_double(bound), length.out = each), space$shape))
+    as.vector(shape_values(rep(as.double(bound), length.out = each), space$shape))
   })
   low <- bounds$low
   high <- bounds$high

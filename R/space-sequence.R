@@ -56,14 +56,7 @@ sample_stack <- function(space, n) {
 
 stack_values <- function(space, values) {
   flat <- lapply(values, row_major)
-  wide <- vapply(flat, inherits, NA, "integer64")
-  numbers <- if (any(wide)) {
-    whole_from_digits(unlist(lapply(flat, whole_text)))
-  } else if (length(flat)) {
-    unlist(flat)
-  } else {
-    decode_numbers(space$dtype, list())
-  }
+  numbers <- if (length(flat)) unlist(flat) else decode_numbers(space$dtype, list())
   stacked <- shape_values(numbers, c(length(values), space$shape))
   if (length(space$shape) == 1L && length(values)) {
     colnames(stacked) <- names(values[[1L]])

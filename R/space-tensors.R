@@ -87,7 +87,6 @@ to_tensors.default <- function(space, value, name, call, path = "") {
   type <- tensor_dtypes[[space$dtype]]
   flat <- row_major(value)
   check_dtype(space, flat, value, call, path)
-  if (!space$dtype %in% c("int64", "uint64")) flat <- double_from_integer64(flat)
   tensor <- list(dtype = type, shape = space$shape, bytes = tensor_types[[type]]$write(flat))
   stats::setNames(list(tensor), name)
 }
@@ -125,7 +124,7 @@ tensor_dtypes <- c(
 
 # Refuses a number that the dtype cannot hold: in bytes it would silently wrap around or overflow.
 check_dtype <- function(space, flat, value, call, path = "") {
-  numbers <- as_double(flat)
+  numbers <- as.double(flat)
   lost <- if (space$dtype %in% names(dtype_ranges)) {
     range <- dtype_ranges[[space$dtype]]
     numbers < range[[1L]] | numbers > range[[2L]]

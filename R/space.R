@@ -110,10 +110,10 @@ write_value <- function(space, value) UseMethod("write_value")
 #' of whole numbers or of strings, an array with an additional dimension, a Tuple or Dict of such
 #' parts, otherwise a list; see [env_reset()].
 #'
-#' Whole numbers are integer if they all fit, double up to 2^53 and [bit64::integer64] beyond. The
-#' smallest int64, -2^63, is `NA` for bit64, and uint64 exceeds its largest number: such a value is
-#' an error. A Box of dtype bool is logical. For Discrete, MultiDiscrete and MultiBinary, `TRUE` and
-#' `FALSE` count as 1 and 0.
+#' Whole numbers are integer if they all fit, and double up to 2^53 - 1. A number beyond is an
+#' error, as is an integer64 of the package bit64; `bit64::as.double.integer64()` converts it. A Box
+#' of dtype bool is logical. For Discrete, MultiDiscrete and MultiBinary, `TRUE` and `FALSE` count
+#' as 1 and 0.
 #'
 #' # The place of a wrong value
 #'
@@ -131,8 +131,7 @@ write_value <- function(space, value) UseMethod("write_value")
 #' @param space A space, such as `gym_make("CartPole-v1")$action_space`.
 #' @param value The value to check: any R object.
 #' @return `space_sample()` returns a value as listed above, `space_contains()` `TRUE` or `FALSE`.
-#' @section Errors: `gym_error_argument` if `space` is not a space. `gym_error_space` from
-#'   `space_sample()` if an integer beyond 2^53 is drawn and the package bit64 is not installed.
+#' @section Errors: `gym_error_argument` if `space` is not a space.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1")

@@ -222,8 +222,7 @@ are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
 abort_argument <- function(x, must, arg, call, hint = NULL) {
   gym_abort(
     c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
-      i = if (is_integer64(x)) "With bit64 attached, `as.numeric()` makes a number of R's own.",
-      i = hint),
+      i = integer64_hint(x), i = hint),
     class = "gym_error_argument",
     argument = arg,
     value = x,
@@ -267,8 +266,8 @@ describe_argument <- function(x) {
   }
 }
 
-# Can the value itself be shown? The class of an integer64 is its only attribute.
+# Can the value itself be shown?
 is_short <- function(x) {
-  plain <- if (is_integer64(x)) unclass(x) else if (is.factor(x)) as.character(x) else x
+  plain <- if (is.factor(x)) as.character(x) else x
   is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))
 }

@@ -5,25 +5,17 @@ shape_values <- function(values, shape) {
   if (length(shape) <= 1L) {
     return(values)
   }
-  wide <- is_integer64(values)
-  values <- unclass(values)
   if (length(shape) == 2L) {
     # Takes a third of the time of aperm().
-    values <- matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
+    matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
   } else {
     dim(values) <- rev(shape)
-    values <- aperm(values)
+    aperm(values)
   }
-  if (wide) structure(values, class = "integer64") else values
 }
 
 # The elements of an array row by row (last index fastest), as in messages.
-row_major <- function(x) {
-  if (!is.object(x) || !is_integer64(x)) {
-    return(if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x))
-  }
-  structure(row_major(unclass(x)), class = "integer64")
-}
+row_major <- function(x) if (length(dim(x)) > 1L) as.vector(aperm(x)) else as.vector(x)
 
 array_shape <- function(x) dim(x) %||% length(x)
 

@@ -46,7 +46,8 @@ abort_space <- function(space, value, problem, call, path = "") {
     paste(place %||% "The", "value", describe_value(value))
   }
   gym_abort(
-    c(paste0(problem, "."), x = paste0(found, " does not fit the space ", format(space), ".")),
+    c(paste0(problem, "."), x = paste0(found, " does not fit the space ", format(space), "."),
+      i = integer64_hint(value)),
     class = "gym_error_space",
     space = space,
     value = value,
@@ -61,7 +62,7 @@ describe_value <- function(value) {
   }
   if (is_integer64(value)) {
     # deparse() would show its bits as a double.
-    return(paste("the integer64", describe_value(double_from_integer64(value))))
+    return("of class integer64")
   }
   if (is.atomic(value) && length(value) == 1L && is.na(value) && !is.nan(value)) {
     return("NA")

@@ -7,9 +7,3 @@ int64 <- function(x) {
   x[] <- readBin(bits, "double", length(x), endian = "little")
   structure(x, class = "integer64")
 }
-
-# 2^53 + 1, which no double is.
-int64_beyond_double <- function() {
-  bits <- writeBin(c(1L, 2097152L), raw(), endian = "little")
-  structure(readBin(bits, "double", 1L, endian = "little"), class = "integer64")
-}

@@ -29,7 +29,7 @@ random_description <- function(depth = 3L, kinds = NULL) {
   switch(kind,
     Discrete = list(
       name = kind, n = pick(list(1L, 5L, 2147483647L)), dtype = "int64",
-      start = pick(list(0L, -3L, 9007199254740000, -9007199254740000))
+      start = pick(list(0L, -3L, 9007190000000000, -9007190000000000))
     ),
     Box = random_box(),
     MultiDiscrete = {

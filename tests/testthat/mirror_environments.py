@@ -45,7 +45,7 @@ def _box(rng, depth):
 
 
 def _discrete(rng, depth):
-    start = _pick(rng, [0, -7, 2**53 - 3, -(2**62), 2**31 - 2])
+    start = _pick(rng, [0, -7, 2**53 - 2**41, -(2**52), 2**31 - 2])
     return spaces.Discrete(_pick(rng, [1, 2, 100, 2**40]), start=start)
 
 
@@ -94,10 +94,10 @@ def special_numbers(dtype):
     if dtype.kind == "b":
         return [False, True]
     limits = np.iinfo(dtype)
-    # R cannot represent the smallest int64, nor a uint64 above the largest int64.
+    # R's numbers are exact below 2**53.
     wanted = [limits.min, limits.max, 0, 1, -(2**31), 2**31, 2**31 - 1, 2**32 - 1, 2**32]
-    wanted += [s * (2**53 + d) for s in (1, -1) for d in (-1, 0, 1)] + [2**63 - 1, 1 - 2**63]
-    return [n for n in wanted if limits.min <= n <= limits.max and -(2**63) < n < 2**63]
+    wanted += [2**53 - 1, 1 - 2**53]
+    return [n for n in wanted if limits.min <= n <= limits.max and -(2**53) < n < 2**53]
 
 
 def draw_value(rng, space):
@@ -111,11 +111,7 @@ def draw_value(rng, space):
             array = np.where(some, chosen, array).astype(space.dtype).reshape(space.shape)
             if space.dtype.kind in "iu" and space.dtype.itemsize == 8:
                 # See special_numbers().
-                array[
-                    array == np.iinfo(np.int64).min
-                    if space.dtype.kind == "i"
-                    else array > np.iinfo(np.int64).max
-                ] = 7
+                array[abs(array.astype(float)) >= 2**53] = 7
             return array
         case spaces.MultiDiscrete():
             edges = [space.start, space.start + (space.nvec - 1), space.sample()]

@@ -75,12 +75,6 @@ test_that("a reset returns the info, when asked", {
   expect_error(env$reset(return_info = 1), "return_info", class = "gym_error_argument")
 })
 
-test_that("a seed that is an integer64 is that seed", {
-  skip_if_not_installed("bit64")
-  env <- local_env()
-  expect_identical(env$reset(seed = bit64::as.integer64(5)), env$reset(seed = 5))
-})
-
 test_that("an info may be handed back as options", {
   env <- local_env()
   info <- (function() {

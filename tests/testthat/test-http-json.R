@@ -28,11 +28,6 @@ test_that("a named list is an object, an unnamed one an array", {
   expect_equal(to_json(structure(list(), names = character())), "{}")
 })
 
-test_that("an integer64 keeps its digits", {
-  skip_if_not_installed("bit64")
-  expect_equal(to_json(bit64::as.integer64("9007199254740993")), "9007199254740993")
-})
-
 test_that("text is escaped and arrives as it was", {
   text <- "quote \" backslash \\ line\nbreak é 漢 \u2028"
   expect_identical(from_json(paste0("[", to_json(text), "]"))[[1]], text)

@@ -98,17 +98,6 @@ test_that("arrays of arrays, parts and texts have the dimensions of the space", 
   expect_identical(dim(arrays$hand[[2]]), c(2L, 2L, 1L))
 })
 
-test_that("integers beyond 2^53 stay exact in arrays", {
-  skip_if_not_installed("bit64")
-  wide <- bit64::as.integer64(c("9007199254740993", "5"))
-  space <- list(name = "Discrete", n = 5L)
-  cells <- cells_in_time(c(1L, 2L, 1L), data.frame(sub_env = 1:2, length = c(2L, 1L)), 2:1)
-  numbers <- array_in_time(new_space(space), list(wide, 7L), cells)
-  expect_s3_class(numbers, "integer64")
-  expect_identical(as.character(bit64::as.integer64(numbers[1:4])),
-                   c("9007199254740993", "7", "5", NA))
-})
-
 test_that("values without one shape are refused before anything is played", {
   sequence <- new_space(list(name = "Sequence", space = list(name = "Discrete", n = 3L),
                              stack = FALSE))

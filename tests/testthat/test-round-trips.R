@@ -34,7 +34,6 @@ play_mirror <- function(env, tensors) {
 
 test_that("random values of random spaces come back to Python as they were", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   server <- local_mirror_server()
   tried <- c(json = 0L, tensors = 0L)
   kinds <- character()

@@ -40,21 +40,6 @@ test_that("values for several sub-environments are drawn as single ones are, one
   }
 })
 
-test_that("integers beyond 2^53 keep every digit, beside smaller ones too", {
-  skip_if_not_installed("bit64")
-  space <- new_space(list(
-    name = "Box", shape = list(2L), dtype = "int64", low = list(-1e18, -1e18),
-    high = list(1e18, 1e18)
-  ))
-  large <- bit64::as.integer64(c("900719925474099301", "3"))
-  batch <- batch_of(space, list(large, c(1L, 2L)))
-  expect_identical(format(batch_value(space, batch, 1L)), format(large))
-  bound <- bind_batches(space, list(batch, batch_of(space, list(5:6))))
-  expect_identical(dim(bound), 3:2)
-  columns <- value_columns(space, bound, "obs")
-  expect_identical(as.character(columns$obs_1), c("900719925474099301", "1", "5"))
-})
-
 test_that("values are put in the place of some of a batch, whatever the space", {
   skip_unless_all()
   withr::local_seed(8)

@@ -64,7 +64,6 @@ test_that("a value for each sub-environment belongs, drawn from each kind of spa
 
 test_that("values of sub-environments of 80 random spaces belong, and come back through tensors", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   withr::local_seed(6)
   tried <- 0L
   while (tried < 80L) {

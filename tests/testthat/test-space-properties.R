@@ -1,6 +1,5 @@
 test_that("values that are drawn belong to their space and come back through JSON", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   withr::local_seed(4)
   tried <- 0L
   for (i in 1:150) {
@@ -19,7 +18,6 @@ test_that("values that are drawn belong to their space and come back through JSO
 
 test_that("values that are drawn come back through tensors", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   withr::local_seed(5)
   tried <- 0L
   while (tried < 200L) {

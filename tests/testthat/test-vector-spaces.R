@@ -44,7 +44,6 @@ make_mirrors <- function(server, ...) {
 
 test_that("values of random spaces reach Python in the sub-environment that they are for", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
   kinds <- character()
   problems <- character()
@@ -92,7 +91,6 @@ expect_shows <- function(space, batch, i, value, number) {
 
 test_that("the last observation of a sub-environment is kept for every kind of space", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   server <- local_mirror_sub_envs()
   for (number in 1:40) {
     env <- make_mirrors(server, number = number, values = 2, num_envs = 2,
@@ -141,21 +139,18 @@ test_that("infos have an entry for each sub-environment, and pictures one dimens
 
 test_that("numbers of sub-environments keep their types, and what R cannot hold is an error", {
   skip_unless_all()
-  skip_if_not_installed("bit64")
   server <- local_odd_server()
   make <- function(name) {
     gym_make(paste0("odd_environments:", name, "-v0"), num_envs = 2, client = server)
   }
-  large <- make("LargeIntegers")$reset()
-  expect_s3_class(large, "integer64")
-  expect_identical(as.character(large[2, ]), c("-1", "9007199254740993", "9223372036854775807"))
   middling <- c(-2^31, 2^31, 2^53 - 1)
   expect_identical(make("MiddlingIntegers")$reset(), rbind(middling, middling, deparse.level = 0))
   odd <- c(NaN, Inf, -Inf, 1 / 3)
   expect_identical(make("NotFinite")$reset(), rbind(odd, odd, deparse.level = 0))
   expect_type(make("Shifted")$reset(), "integer")
-  expect_error(make("SmallestInteger")$reset(), "-9223372036854775808", class = "gym_error_space")
-  expect_error(make("LargestNatural")$reset(), class = "gym_error_space")
+  for (name in c("LargeIntegers", "SmallestInteger", "LargestNatural")) {
+    expect_error(make(name)$reset(), class = "gym_error_space")
+  }
 })
 
 test_that("the server draws actions of a vector environment in the form in which it takes them", {
