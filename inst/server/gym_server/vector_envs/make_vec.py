@@ -232,7 +232,7 @@ def _make_entry_point(request: _Request) -> VectorEnv:
         )
     except GymServerError as refusal:
         if refusal.code in ("invalid_parameter", "invalid_kwargs"):
-            raise _NotPossibleError(_why_no_argument(request, refusal)) from refusal
+            raise _NotPossibleError(refusal.message) from refusal
         if "Invalid autoreset_mode" in refusal.message:
             wanted = request.autoreset_mode.value
             raise _NotPossibleError(f"its autoreset_mode cannot be {wanted}") from refusal
@@ -245,8 +245,16 @@ def _make_entry_point(request: _Request) -> VectorEnv:
     if mode != request.autoreset_mode:
         env.close()
         raise _NotPossibleError(f"its autoreset_mode is {getattr(mode, 'value', mode)}")
-    env.spec = _with_time_limit(request)
+    env.spec = _with_time_limit(
+        request.spec, request.kwargs.get("max_episode_steps", request.spec.max_episode_steps)
+    )
     return env
+
+
+def _with_time_limit(spec: EnvSpec, max_episode_steps: int | None) -> EnvSpec:
+    spec = copy.copy(spec)
+    spec.max_episode_steps = max_episode_steps
+    return spec
 
 
 def _check_sizes(request: _Request) -> None:
@@ -260,31 +268,6 @@ def _check_sizes(request: _Request) -> None:
         raise GymServerError(
             "invalid_kwargs", "'batch_size' must be left out: all sub-environments step together"
         )
-
-
-def _why_no_argument(request: _Request, refusal: GymServerError) -> str:
-    """Say what limits an episode of Atari's games, whose implementation counts frames."""
-    if resets_each(request.spec) and "'max_episode_steps'" in refusal.message:
-        return (
-            "it counts frames and not steps: use max_num_frames_per_episode, of which a step takes "
-            "as many as its frameskip"
-        )
-    return refusal.message
-
-
-def _with_time_limit(request: _Request) -> EnvSpec:
-    """Return the spec with the smallest time limit of a sub-environment."""
-    spec = copy.copy(request.spec)
-    chosen = request.kwargs.get("max_episode_steps")
-    if chosen is not None:
-        spec.max_episode_steps = None if chosen == -1 else chosen
-    limits = [
-        parse_nonfinite(wrapper.kwargs["max_episode_steps"])
-        for wrapper in request.config.wrappers
-        if wrapper.name == "TimeLimit"
-    ]
-    spec.max_episode_steps = min(filter(None, [spec.max_episode_steps, *limits]), default=None)
-    return spec
 
 
 # Sub-environments that are environments of their own ------------------------------------------
@@ -309,7 +292,7 @@ def _make_sub_envs(request: _Request) -> tuple[SubEnvs, str]:
             raise
         log.info("%s runs in the server's process: %s", request.spec.id, refusal.message)
         env = make.call_env(_make_with, request, sub_env, 0)
-    env.spec = _with_time_limit(request)
+    env.spec = _with_time_limit(request.spec, env.time_limit)
     return env, "async" if env.num_workers else "sync"
 
 

@@ -1,14 +1,13 @@
 """Vector environments made of separate sub-environments.
 
-They form groups, in this process or in worker processes. A step of all sends one call to each
-group. The results are the same for any number of processes.
+They form a group in this process, or one in each of several worker processes. A step of all sends
+one call to each. The results are the same for any number of processes.
 """
 
 from __future__ import annotations
 
 import pickle
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -18,9 +17,9 @@ from gymnasium.spaces import Space
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from gym_server import memory, spaces
+from gym_server import spaces
 from gym_server.envs.drawing import Drawing
-from gym_server.envs.wrappers import draws_when_stepped
+from gym_server.envs.wrappers import draws_when_stepped, time_limit
 from gym_server.errors import GymServerError
 from gym_server.processes.cores import spread
 from gym_server.processes.pool import pool
@@ -29,12 +28,8 @@ from gym_server.rendering.render_thread import RenderThread
 from gym_server.spaces.stacking import ARRAYS, join, unstack
 from gym_server.vector_envs import group_worker
 from gym_server.vector_envs.group import Group, Outcome
-from gym_server.vector_envs.group_calls import AnyGroup, LocalGroup, call_all
 from gym_server.vector_envs.infos import gather
 from gym_server.vector_envs.sub_env import SubEnv
-
-# How long closing may take in a process before it is killed.
-_CLOSE_SECONDS = 3.0
 
 
 class SubEnvs:
@@ -49,6 +44,7 @@ class SubEnvs:
         draws_when_stepped: whether its steps must run on the render thread.
         metadata, render_mode: as in Gymnasium.
         spec: the environment's spec, set by the function that makes it.
+        time_limit: the smallest time limit of a sub-environment, or None.
         single_observation_space, single_action_space: the spaces of one sub-environment.
         observation_space, action_space: the batched spaces.
     """
@@ -94,16 +90,16 @@ class SubEnvs:
         self._to_begin = np.full(num_envs, -1)
         # The number of each group's first sub-environment, and at the end the number of all.
         self._bounds = _bounds(num_envs, max(1, num_workers))
-        groups = [range(first, end) for first, end in pairwise(self._bounds)]
-        self._groups: list[AnyGroup] = []
+        # The group in this process, or the processes of several.
+        self._group: Group | None = None
+        self._processes: list[WorkerProcess] = []
         if num_workers == 0:
-            group = Group(sub_env, groups[0], autoreset_mode)
-            self._describe(group.envs[0], group.render_mode)
+            self._group = Group(sub_env, range(num_envs), autoreset_mode)
+            self._describe(self._group.envs[0], self._group.render_mode)
             self.drawing.drawn = self.draws_when_stepped
-            self._groups.append(LocalGroup(group, self.drawing))
         else:
             self._describe_one(sub_env)
-            self._start(sub_env, groups)
+            self._start(sub_env)
 
     # Making ---------------------------------------------------------------------------------
 
@@ -127,15 +123,18 @@ class SubEnvs:
         self.observation_space = batch_space(env.observation_space, self.num_envs)
         self.action_space = batch_space(env.action_space, self.num_envs)
         self.draws_when_stepped = draws_when_stepped(env)
+        self.time_limit = time_limit(env)
 
-    def _start(self, sub_env: SubEnv, groups: Sequence[range]) -> None:
+    def _start(self, sub_env: SubEnv) -> None:
         try:
-            for _ in groups:
-                self._groups.append(pool.take(group_worker.__name__))
+            for _ in range(self.num_workers):
+                self._processes.append(pool.take(group_worker.__name__))
             pickled = _pickled(sub_env)
-            call_all(
-                (group, "make", (pickled, numbers, self.autoreset_mode))
-                for group, numbers in zip(self._groups, groups, strict=True)
+            _call_all(
+                (process, "make", (pickled, range(first, end), self.autoreset_mode))
+                for process, (first, end) in zip(
+                    self._processes, pairwise(self._bounds), strict=True
+                )
             )
         except GymServerError as refusal:
             self._kill_processes()
@@ -264,29 +263,34 @@ class SubEnvs:
             arguments: returns the other arguments for a range of these sub-environments.
             everywhere: whether to call groups that have none of them, too.
         """
+        if self._group is not None:
+            own = None if which is None else which.tolist()
+            return [getattr(self._group, method)(own, *arguments(slice(None)))]
         bounds = self._bounds if which is None else np.searchsorted(which, self._bounds).tolist()
 
-        def calls() -> Iterator[tuple[AnyGroup, str, tuple]]:
-            for group, (first, last), start in zip(
-                self._groups, pairwise(bounds), self._bounds, strict=False
+        def calls() -> Iterator[_Call]:
+            for process, (first, last), start in zip(
+                self._processes, pairwise(bounds), self._bounds, strict=False
             ):
                 if first < last or everywhere:
                     rows = slice(first, last)
                     own = None if which is None else (which[rows] - start).tolist()
-                    yield group, method, (own, *arguments(rows))
+                    yield process, method, (own, *arguments(rows))
 
-        return call_all(calls())
+        return _call_all(calls())
 
     def _ask_one(self, method: str, sub_env: int) -> Any:
+        if self._group is not None:
+            return getattr(self._group, method)(sub_env)
         place = int(np.searchsorted(self._bounds, sub_env, side="right")) - 1
-        group = self._groups[place]
-        group.begin(method, sub_env - self._bounds[place])
-        return group.finish()
+        return self._processes[place].call(method, sub_env - self._bounds[place])
 
     # Looks ----------------------------------------------------------------------------------
 
     def draw(self, sub_env: int) -> object:
         """Draw a sub-environment."""
+        if self._group is not None:
+            return self.drawing.draw(self._group.render, sub_env)
         return self._ask_one("render", sub_env)
 
     def observed(self, sub_env: int, batch: object) -> object:
@@ -298,9 +302,8 @@ class SubEnvs:
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Report from now on if a process ends unexpectedly, or at once if one has."""
         self._on_end = on_end
-        for group in self._groups:
-            if isinstance(group, WorkerProcess):
-                group.report_end(self._end)
+        for process in self._processes:
+            process.report_end(self._end)
 
     def _end(self, why: GymServerError) -> None:
         """End when one of the processes has ended."""
@@ -312,49 +315,57 @@ class SubEnvs:
     @property
     def pids(self) -> list[int]:
         """The numbers of its processes."""
-        return [group.pid for group in self._groups if isinstance(group, WorkerProcess)]
+        return [process.pid for process in self._processes]
 
     def close(self) -> None:
         """Close all sub-environments, and release or end their processes."""
         if self._is_closed:
             return
         self._is_closed = True
-        for group in self._groups:
-            if isinstance(group, LocalGroup):
-                group.close()
-            else:
-                group.release()
-        if self.num_workers == 0:
-            return
-        is_overdue = threading.Event()
-
-        def end_overdue() -> None:
-            is_overdue.set()
-            self._kill_processes()
-
-        timer = threading.Timer(_CLOSE_SECONDS, end_overdue)
-        timer.daemon = True
+        if self._group is not None:
+            self.drawing.close(self._group.close)
+        for process in self._processes:
+            process.release()
         try:
-            memory.start(timer)
-            call_all((group, "close", ()) for group in self._groups)
+            _call_all((process, "close", ()) for process in self._processes)
         except BaseException:
             self._kill_processes()
-            if not is_overdue.is_set():
-                raise
-            # It was killed because it took too long, which is not the client's error.
-            return
-        finally:
-            timer.cancel()
-        for group in self._groups:
-            if isinstance(group, WorkerProcess) and self._keeps_processes:
-                pool.put(group)
-        if not self._keeps_processes:
-            self._kill_processes()
+            raise
+        for process in self._processes:
+            if self._keeps_processes:
+                pool.put(process)
+            else:
+                process.kill()
 
     def _kill_processes(self, why: GymServerError | None = None) -> None:
-        for group in self._groups:
-            if isinstance(group, WorkerProcess):
-                group.kill(why)
+        for process in self._processes:
+            process.kill(why)
+
+
+# A process, the name of a method of its group, and the arguments.
+_Call = tuple[WorkerProcess, str, tuple]
+
+
+def _call_all(calls: Iterable[_Call]) -> list:
+    """Start all calls and wait for all results; then raise the first error."""
+    results = []
+    begun = []
+    failure: BaseException | None = None
+    try:
+        for process, method, arguments in calls:
+            process.begin(method, *arguments)
+            begun.append(process)
+    except BaseException as refusal:
+        failure = refusal
+    for process in begun:
+        # Take all results: one that is left over would be taken for the next call's.
+        try:
+            results.append(process.finish())
+        except BaseException as refusal:
+            failure = failure or refusal
+    if failure is not None:
+        raise failure
+    return results
 
 
 def _pickled(sub_env: SubEnv) -> bytes:

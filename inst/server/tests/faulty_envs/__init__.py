@@ -11,7 +11,6 @@ from faulty_envs.drawing import Drawing, OldRenderModes
 from faulty_envs.hanging import (
     Gated,
     Hanging,
-    HangsWhenClosedElsewhere,
     Meeting,
 )
 from faulty_envs.hoarding import Hoards, Large
@@ -53,7 +52,6 @@ for _kind in (
     ExitsInStep,
     Gated,
     Hanging,
-    HangsWhenClosedElsewhere,
     Hoards,
     Insists,
     KeepsItsArrays,

@@ -72,11 +72,3 @@ class Gated(Counting):
 
     def close(self):
         self.wait("close")
-
-
-class HangsWhenClosedElsewhere(Counting):
-    """Hangs when it is closed in a child process."""
-
-    def close(self):
-        if multiprocessing.parent_process() is not None:
-            time.sleep(3600)

@@ -307,7 +307,7 @@ def test_atari_resets_in_the_same_step(client, atari):
         ({"autoreset_mode": "Disabled"}, "its autoreset_mode cannot be Disabled"),
         ({"seed": 2**31 - 1}, "its seeds must be below 2147483648"),
         ({"seed": [1, 2**31]}, "its seeds must be below 2147483648"),
-        ({"kwargs": {"max_episode_steps": 9}}, "use max_num_frames_per_episode"),
+        ({"kwargs": {"max_episode_steps": 9}}, "unexpected keyword argument 'max_episode_steps'"),
     ],
 )
 def test_what_atari_cannot_do_is_said(client, fields, words):

@@ -2,8 +2,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-import time
 
 import faulty_envs  # noqa: F401 - it registers what is made here
 import gymnasium
@@ -191,30 +189,6 @@ def test_a_process_that_ends_takes_its_environment_with_it(make, how, eventually
     assert refusal.value.code == "environment_died"
     eventually(lambda: not any(map(is_running, pids)))
     eventually(lambda: [why.code for why in told] == ["environment_died"])
-
-
-def test_closing_does_not_wait_for_a_process_that_hangs(make, monkeypatch, eventually):
-    monkeypatch.setattr("gym_server.vector_envs.sub_envs._CLOSE_SECONDS", 0.3)
-    env = make("HangsWhenClosedElsewhere")
-    env.reset(1, None, None)
-    pids = env.pids
-    # If it waited, this would take an hour.
-    env.close()
-    eventually(lambda: not any(map(is_running, pids)))
-
-
-def test_closing_is_no_error_while_what_hangs_is_still_being_killed(make, monkeypatch):
-    monkeypatch.setattr("gym_server.vector_envs.sub_envs._CLOSE_SECONDS", 0.3)
-    env = make("HangsWhenClosedElsewhere", num_workers=1)
-    kill = env._kill_processes
-
-    def kill_slowly(*args):
-        kill(*args)
-        if threading.current_thread() is not threading.main_thread():
-            time.sleep(1)
-
-    monkeypatch.setattr(env, "_kill_processes", kill_slowly)
-    env.close()
 
 
 def test_what_cannot_be_sent_is_refused(make):
