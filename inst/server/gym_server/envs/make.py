@@ -11,7 +11,6 @@ from typing import Any, TypeVar, cast
 import gymnasium
 from gymnasium import error
 from gymnasium.envs import registration
-from gymnasium.vector import AutoresetMode
 
 from gym_server import logs
 from gym_server.envs import mujoco
@@ -25,7 +24,7 @@ from gym_server.envs.extras import (
     why_unavailable,
 )
 from gym_server.envs.registry import LONGEST_ID, import_allowed, importing, look_up, near
-from gym_server.envs.tuple_arguments import parameters_of, with_tuples
+from gym_server.envs.tuple_arguments import with_tuples
 from gym_server.errors import GymServerError, environment_error, invalid_parameter
 from gym_server.json_values import brief, parse_nonfinite
 
@@ -256,26 +255,7 @@ def make_from_spec(
     if render_mode is not None:
         ours["render_mode"] = render_mode
     given = with_tuples(load_creator(spec), kwargs)
-    try:
-        return call_env(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
-    except GymServerError as refusal:
-        if refusal.code == "invalid_kwargs" and spec.vector_entry_point is not None:
-            _explain_vector_arguments(spec, kwargs, refusal)
-        raise
-
-
-def _explain_vector_arguments(
-    spec: registration.EnvSpec, kwargs: dict, refusal: GymServerError
-) -> None:
-    """Say so if an argument belongs to an environment's vector implementation only."""
-    known = parameters_of(load_creator(vector_spec(spec)))
-    for name in kwargs:
-        if name in known and f"'{name}'" in refusal.message:
-            raise GymServerError(
-                "invalid_kwargs",
-                f"Only the vector implementation of {spec.id} has an argument '{name}'",
-                'send num_envs, and vectorization_mode "vector_entry_point"',
-            ) from refusal
+    return call_env(_refusing_kwargs, lambda: gymnasium.make(spec, **{**ours, **given}), kwargs)
 
 
 def vector_spec(spec: registration.EnvSpec) -> registration.EnvSpec:
@@ -287,35 +267,26 @@ def vector_spec(spec: registration.EnvSpec) -> registration.EnvSpec:
 
 
 def make_vector_entry_point(
-    spec: registration.EnvSpec,
-    num_envs: int,
-    render_mode: str | None,
-    kwargs: dict,
-    autoreset_mode: AutoresetMode,
+    spec: registration.EnvSpec, kwargs: dict, ours: dict[str, Any]
 ) -> gymnasium.vector.VectorEnv:
     """Make an environment's own vector implementation.
 
-    Its autoreset_mode may be another one, if it has no such argument.
+    Args:
+        spec: the environment's spec.
+        kwargs: the client's arguments.
+        ours: other arguments of ``gymnasium.make_vec()``.
 
     Raises:
         GymServerError: as for ``make_from_spec()``.
     """
-
-    def make() -> gymnasium.vector.VectorEnv:
-        ours: dict[str, Any] = {} if render_mode is None else {"render_mode": render_mode}
-        if "autoreset_mode" in parameters_of(load_creator(vector_spec(spec))):
-            ours["autoreset_mode"] = autoreset_mode
-        return gymnasium.make_vec(
-            spec,
-            num_envs=num_envs,
-            vectorization_mode="vector_entry_point",
-            vector_kwargs={},
-            wrappers=(),
-            **ours,
-            **kwargs,
-        )
-
-    return call_env(_refusing_kwargs, make, kwargs)
+    mode = "vector_entry_point"
+    return call_env(
+        _refusing_kwargs,
+        lambda: gymnasium.make_vec(
+            spec, vectorization_mode=mode, vector_kwargs={}, wrappers=(), **ours, **kwargs
+        ),
+        kwargs,
+    )
 
 
 def _refusing_kwargs(make: Callable[[], ResultT], kwargs: dict) -> ResultT:

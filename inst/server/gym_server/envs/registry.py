@@ -103,17 +103,13 @@ def near(name: str, limit: int = 3) -> list[str]:
 
     Leaves out ids that no extra of the server can make.
     """
-    ids = [
-        env_id
+    by_lower_case = {
+        env_id.lower(): env_id
         for env_id, spec in gymnasium.registry.items()
         if is_available(spec) or lacks_extra(spec)
-    ]
-    found = difflib.get_close_matches(name, ids, n=limit, cutoff=0.6)
-    if not found:
-        by_lower_case = {env_id.lower(): env_id for env_id in ids}
-        matches = difflib.get_close_matches(name.lower(), by_lower_case, n=limit, cutoff=0.6)
-        found = [by_lower_case[match] for match in matches]
-    return found
+    }
+    found = difflib.get_close_matches(name.lower(), by_lower_case, n=limit, cutoff=0.6)
+    return [by_lower_case[match] for match in found]
 
 
 def search(text: str | None, allowed_modules: Collection[str]) -> list[dict]:

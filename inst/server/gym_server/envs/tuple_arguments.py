@@ -7,9 +7,8 @@ Most constructors accept any sequence, but some check for a tuple, such as Atari
 from __future__ import annotations
 
 import inspect
-import types
-import typing
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 
 
 def with_tuples(creator: Callable, kwargs: dict) -> dict:
@@ -31,28 +30,19 @@ def with_tuples(creator: Callable, kwargs: dict) -> dict:
     }
 
 
-def parameters_of(creator: Callable) -> typing.Mapping[str, inspect.Parameter]:
+def parameters_of(creator: Callable) -> Mapping[str, inspect.Parameter]:
     """Return the parameters of a class or function by name; none if they are not known."""
-    # Evaluating an annotation fails if it is a string with names that are imported only for type
-    # checkers, or for any other reason.
-    for eval_str in (True, False):
-        try:
-            return inspect.signature(creator, eval_str=eval_str).parameters
-        except Exception:
-            continue
-    return {}
+    try:
+        return inspect.signature(creator).parameters
+    except (TypeError, ValueError):
+        return {}
 
 
 def _wants(parameter: inspect.Parameter) -> bool:
-    kinds = {typing.get_origin(one) or one for one in _members(parameter.annotation)}
-    takes_lists = any(isinstance(kind, type) and issubclass(list, kind) for kind in kinds)
-    return isinstance(parameter.default, tuple) or (tuple in kinds and not takes_lists)
-
-
-def _members(annotation: object) -> tuple:
-    """Return the members of a union, or the annotation itself."""
-    is_union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
-    return typing.get_args(annotation) if is_union else (annotation,)
+    # The annotation as text: it may have names that are imported only for type checkers.
+    annotation = str(parameter.annotation).lower()
+    takes_lists = re.search("list|sequence|iterable|collection", annotation)
+    return isinstance(parameter.default, tuple) or ("tuple" in annotation and not takes_lists)
 
 
 def _as_tuple(value: object) -> object:

@@ -42,7 +42,7 @@ def about(instance: Instance) -> dict:
         "kwargs": config.kwargs or {},
         "wrappers": [wrapper._asdict() for wrapper in config.wrappers],
         "seed": config.seed,
-        "episode_steps": instance.statistics.of(0).step if config.num_envs is None else None,
+        "episode_steps": instance.statistics.of(0)["step"] if config.num_envs is None else None,
         "needs_reset": instance.has_ended or not instance.was_reset,
         "monitor": monitor.about() if monitor else None,
     }

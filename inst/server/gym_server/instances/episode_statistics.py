@@ -3,29 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
 # How many returns are kept.
 _KEPT = 100
-
-
-class Standing(NamedTuple):
-    """The state of an episode.
-
-    Attributes:
-        episode: its number, from 1; 0 before the first.
-        step: the number of steps so far.
-        episode_return: the sum of rewards so far.
-        ended: whether it has ended.
-    """
-
-    episode: int
-    step: int
-    episode_return: float
-    ended: bool
 
 
 class EpisodeStatistics:
@@ -63,9 +46,15 @@ class EpisodeStatistics:
             self._ended = True
             self.returns.append(self._return)
 
-    def of(self, sub_env: int) -> Standing:
-        """Return the state of the episode."""
-        return Standing(self._episode, self._step, self._return, self._ended)
+    def of(self, sub_env: int) -> dict:
+        """Return the state of the episode, and the returns of earlier ones, as JSON values."""
+        return {
+            "state": "ended" if self._ended else "running",
+            "episode": self._episode,
+            "step": self._step,
+            "return": self._return,
+            "returns": list(self.returns),
+        }
 
 
 class VectorEpisodeStatistics:
@@ -118,28 +107,17 @@ class VectorEpisodeStatistics:
             else:
                 self._ended[over] = True
 
-    def of(self, sub_env: int) -> Standing:
-        """Return the state of a sub-environment's episode."""
-        return Standing(
-            int(self._episodes[sub_env]),
-            int(self._steps[sub_env]),
-            float(self._returns[sub_env]),
-            bool(self._ended[sub_env]),
-        )
+    def of(self, sub_env: int) -> dict:
+        """Return the state of a sub-environment's episode, and the returns of all earlier ones."""
+        return {
+            "state": "ended" if self._ended[sub_env] else "running",
+            "episode": int(self._episodes[sub_env]),
+            "step": int(self._steps[sub_env]),
+            "return": float(self._returns[sub_env]),
+            "returns": list(self.returns),
+        }
 
 
 def _any(flags: np.ndarray) -> bool:
     """Return whether a flag is true, in 0.7 us for 32 flags; ``any()`` takes 2.5."""
     return b"\1" in flags.tobytes()
-
-
-def facts_of(statistics: EpisodeStatistics | VectorEpisodeStatistics, sub_env: int) -> dict:
-    """Return the statistics of a sub-environment as JSON values for its watchers."""
-    standing = statistics.of(sub_env)
-    return {
-        "state": "ended" if standing.ended else "running",
-        "episode": standing.episode,
-        "step": standing.step,
-        "return": standing.episode_return,
-        "returns": list(statistics.returns),
-    }

@@ -12,18 +12,18 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.make import call_env, env_id_of
 from gym_server.envs.outcomes import checked_info
+from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import time_limit
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed, unknown_instance
 from gym_server.instances.actions import ActionReader
 from gym_server.instances.episode_statistics import (
     EpisodeStatistics,
     VectorEpisodeStatistics,
-    facts_of,
 )
 from gym_server.instances.observations import ObservationWriter
 from gym_server.json_values import plain
-from gym_server.monitoring.monitor import Monitor
-from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.monitoring.monitor import Monitor, require_video
+from gym_server.monitoring.monitor_directory import MonitorRoot, take_directory
 from gym_server.protocol.answers import JSON_FORM, AnswerForm
 from gym_server.rendering.png import picture
 from gym_server.rendering.render_thread import RenderThread
@@ -198,9 +198,9 @@ class Instance:
         self, seed: Seed, options: dict | None, form: AnswerForm, mask: np.ndarray | None
     ) -> dict:
         self._check_reset(seed, options, mask)
-        seed_to_use = self._seed_for_reset if seed is None else seed
+        own_seed = self._seed_for_reset if seed is None else seed
         self.was_reset = False
-        observation, info = call_env(self._begin, self._reset_env, seed_to_use, options, mask, form)
+        observation, info = call_env(self._begin, self._reset_env, own_seed, options, mask, form)
         if form.infos:
             checked_info(info)
         self._seed_for_reset = None
@@ -278,7 +278,7 @@ class Instance:
             "env_id": self.env_id,
             "sub_env": sub_env,
             "num_envs": self.config.num_envs,
-            **facts_of(self.statistics, sub_env),
+            **self.statistics.of(sub_env),
             "reward_threshold": getattr(self.gym_env.spec, "reward_threshold", None),
             "steps": self.steps,
             "fps": self.viewer.fps if self.config.render_mode == "human" else None,
@@ -300,12 +300,17 @@ class Instance:
         Raises:
             GymServerError: ``not_supported``; ``environment_error``.
         """
-        raise GymServerError(
-            "not_supported",
+        self._require_single(
             f"{self.env_id} has sub-environments here, and only single environments have a "
-            "transition model",
-            "create it without num_envs",
+            "transition model"
         )
+        with self.lock:
+            self.lock.call = "transition_model"
+            return {"model": call_env(transition_model, self.gym_env, self.env_id)}
+
+    def _require_single(self, reason: str) -> None:
+        if self.config.num_envs is not None:
+            raise GymServerError("not_supported", reason, "create it without num_envs")
 
     def space_info(self, name: str) -> dict:
         """Return the description of a space by its name, of a batched one with sub-environments."""
@@ -315,10 +320,7 @@ class Instance:
         return self._space_info[name]
 
     def contains(self, name: str, claim: dict) -> bool:
-        """Answer a client's "contains" question; see ``spaces.contains()``.
-
-        With sub-environments, the claim's value has an entry for each.
-        """
+        """Answer a client's "contains" question, with a value for each sub-environment."""
         single: Space = getattr(self, f"single_{name}")
         return spaces.contains(
             getattr(self.gym_env, name),
@@ -343,17 +345,28 @@ class Instance:
 
         Args:
             root: the directories that monitors may write to.
-            directory: the directory's name as the client sent it.
+            directory: as the client sent it.
             force: whether to delete its contents.
             resume: whether to continue the numbering.
-            video_every: record every episode whose number is a multiple as a video; 0 for none.
+            video_every: see ``Monitor``.
         """
-        raise GymServerError(
-            "not_supported",
+        self._require_single(
             f"Instance {self.instance_id} has sub-environments, and monitors record only single "
-            "environments",
-            "create it without num_envs",
+            "environments"
         )
+        with self.lock:
+            self.lock.call = "start_monitor"
+            path = root.resolve(directory)
+            if self.monitor is not None:
+                raise GymServerError(
+                    "monitor_active",
+                    f"Instance {self.instance_id} is already monitored",
+                    "close that monitor first",
+                )
+            if video_every:
+                require_video(self.gym_env)
+            taken = take_directory(path, directory, self.instance_id, force, resume)
+            self.monitor = Monitor(self.gym_env, taken, video_every, lambda: self.draw(0))
 
     def close_monitor(self) -> None:
         """Stop recording, if active; raise ``monitor_directory`` if something was not written."""

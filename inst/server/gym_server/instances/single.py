@@ -12,14 +12,11 @@ from gym_server.envs.config import EnvConfig
 from gym_server.envs.drawing import Drawing
 from gym_server.envs.make import call_env
 from gym_server.envs.outcomes import checked_info, reward_number
-from gym_server.envs.transition_model import transition_model
 from gym_server.envs.wrappers import draws_when_stepped
 from gym_server.errors import GymServerError, invalid_parameter, reset_needed
 from gym_server.instances.episode_statistics import EpisodeStatistics
 from gym_server.instances.instance import Instance
 from gym_server.json_values import plain
-from gym_server.monitoring.monitor import Monitor, require_video
-from gym_server.monitoring.monitor_directory import MonitorRoot, take_directory
 from gym_server.protocol.answers import AnswerForm
 from gym_server.rendering.render_thread import RenderThread
 
@@ -96,32 +93,6 @@ class SingleInstance(Instance):
     def draw(self, sub_env: int) -> object:
         """Draw the environment on the render thread."""
         return self.drawing.draw(self.gym_env.render)
-
-    def transition_model(self) -> dict:
-        """Return the transition model of an environment that has one."""
-        with self.lock:
-            self.lock.call = "transition_model"
-            return {"model": call_env(transition_model, self.gym_env, self.env_id)}
-
-    def start_monitor(
-        self, root: MonitorRoot, directory: str, force: bool, resume: bool, video_every: int
-    ) -> None:
-        """Record the episodes that start from now on; see ``Instance.start_monitor()``."""
-        with self.lock:
-            self.lock.call = "start_monitor"
-            path = root.resolve(directory)
-            if self.monitor is not None:
-                raise GymServerError(
-                    "monitor_active",
-                    f"Instance {self.instance_id} is already monitored",
-                    "close that monitor first",
-                )
-            if video_every:
-                require_video(self.gym_env)
-            taken = take_directory(path, directory, self.instance_id, force, resume)
-            self.monitor = Monitor(self.gym_env, taken, video_every, lambda: self.draw(0))
-
-    # The end --------------------------------------------------------------------------------
 
     def _close_env(self) -> None:
         self.drawing.close(self.gym_env.close)

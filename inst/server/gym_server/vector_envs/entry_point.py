@@ -137,6 +137,3 @@ class EntryPointEnv:
     def close(self) -> None:
         """Close the environment."""
         self.drawing.close(self._env.close)
-
-    def kill(self, why: GymServerError | None = None) -> None:
-        """Do nothing: it runs in this process."""

@@ -15,7 +15,7 @@ from gym_server.envs import make
 from gym_server.envs.config import EnvConfig
 from gym_server.envs.extras import extra_of
 from gym_server.envs.registry import is_known, module_of
-from gym_server.envs.tuple_arguments import with_tuples
+from gym_server.envs.tuple_arguments import parameters_of, with_tuples
 from gym_server.errors import GymServerError, invalid_parameter, wrong_length
 from gym_server.json_values import parse_nonfinite
 from gym_server.rendering.render_thread import RenderThread
@@ -218,18 +218,15 @@ class _NotPossibleError(Exception):
 def _make_entry_point(request: _Request) -> VectorEnv:
     creator = make.load_creator(make.vector_spec(request.spec))
     try:
-        render_mode = (
-            None
-            if extra_of(request.spec) == "jax"
-            else make.choose_render_mode(creator, request.spec, request.config.render_mode)
-        )
-        env = make.make_vector_entry_point(
-            request.spec,
-            request.num_envs,
-            render_mode,
-            with_tuples(creator, request.kwargs),
-            request.autoreset_mode,
-        )
+        ours: dict[str, Any] = {"num_envs": request.num_envs}
+        if extra_of(request.spec) != "jax":
+            mode = make.choose_render_mode(creator, request.spec, request.config.render_mode)
+            ours.update({} if mode is None else {"render_mode": mode})
+        # Without such an argument its mode may be another one.
+        if "autoreset_mode" in parameters_of(creator):
+            ours["autoreset_mode"] = request.autoreset_mode
+        kwargs = with_tuples(creator, request.kwargs)
+        env = make.make_vector_entry_point(request.spec, kwargs, ours)
     except GymServerError as refusal:
         if refusal.code in ("invalid_parameter", "invalid_kwargs"):
             raise _NotPossibleError(refusal.message) from refusal

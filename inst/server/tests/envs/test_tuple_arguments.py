@@ -38,10 +38,10 @@ def test_lists_become_tuples_where_the_constructor_asks_for_tuples(name, given, 
     assert with_tuples(Takes, {name: given, "other": 1}) == {name: wanted, "other": 1}
 
 
-def test_annotations_that_cannot_be_read_are_passed_over():
+def test_annotations_that_cannot_be_evaluated_are_read():
     def create(skip: "Unknown | tuple", start: "Unknown" = (0, 0)): ...  # noqa: F821
 
-    assert with_tuples(create, {"skip": [1], "start": [1]}) == {"skip": [1], "start": (1,)}
+    assert with_tuples(create, {"skip": [1], "start": [1]}) == {"skip": (1,), "start": (1,)}
     assert with_tuples(type(None), {"skip": [1]}) == {"skip": [1]}
 
 

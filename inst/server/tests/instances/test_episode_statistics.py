@@ -4,10 +4,13 @@ from gymnasium.vector import AutoresetMode
 
 from gym_server.instances.episode_statistics import (
     EpisodeStatistics,
-    Standing,
     VectorEpisodeStatistics,
-    facts_of,
 )
+
+
+def standing(statistics, sub_env):
+    found = statistics.of(sub_env)
+    return found["episode"], found["step"], found["return"], found["state"] == "ended"
 
 
 def play(statistics, rewards, ends=True):
@@ -18,21 +21,21 @@ def play(statistics, rewards, ends=True):
 
 def test_an_episode_is_counted_from_its_reset():
     statistics = EpisodeStatistics()
-    assert statistics.of(0) == Standing(0, 0, 0.0, False)
+    assert standing(statistics, 0) == (0, 0, 0.0, False)
     statistics.begin()
-    assert statistics.of(0) == Standing(1, 0, 0.0, False)
+    assert standing(statistics, 0) == (1, 0, 0.0, False)
     statistics.step(1.5, False)
     statistics.step(2.0, True)
-    assert statistics.of(0) == Standing(1, 2, 3.5, True)
+    assert standing(statistics, 0) == (1, 2, 3.5, True)
     statistics.begin()
-    assert statistics.of(0) == Standing(2, 0, 0.0, False)
+    assert standing(statistics, 0) == (2, 0, 0.0, False)
 
 
 def test_watchers_are_told_of_the_episode_and_the_returns_before_it():
     statistics = EpisodeStatistics()
     play(statistics, [1, 2])
     play(statistics, [5], ends=False)
-    assert facts_of(statistics, 0) == {
+    assert statistics.of(0) == {
         "state": "running",
         "episode": 2,
         "step": 1,
@@ -45,7 +48,7 @@ def test_a_reset_that_follows_a_reset_begins_no_other_episode():
     statistics = EpisodeStatistics()
     statistics.begin()
     statistics.begin()
-    assert statistics.of(0).episode == 1
+    assert statistics.of(0)["episode"] == 1
 
 
 def test_returns_are_of_episodes_that_ended():
@@ -54,14 +57,14 @@ def test_returns_are_of_episodes_that_ended():
     play(statistics, [5], ends=False)
     play(statistics, [4])
     assert list(statistics.returns) == [3, 4]
-    assert statistics.of(0).episode == 3
+    assert statistics.of(0)["episode"] == 3
 
 
 def test_steps_after_the_end_count_for_nothing():
     statistics = EpisodeStatistics()
     play(statistics, [1])
     statistics.step(7, True)
-    assert statistics.of(0) == Standing(1, 1, 1.0, True)
+    assert standing(statistics, 0) == (1, 1, 1.0, True)
     assert list(statistics.returns) == [1]
 
 
@@ -86,19 +89,19 @@ def step(statistics, rewards, ended, sub_envs=None):
 def test_the_step_that_resets_a_sub_env_is_no_step_of_its_episode():
     statistics = sub_envs_of(AutoresetMode.NEXT_STEP)
     step(statistics, [1, 1, 1], [0, 1, 0])
-    assert statistics.of(1) == Standing(1, 1, 1.0, True)
+    assert standing(statistics, 1) == (1, 1, 1.0, True)
     step(statistics, [1, 0, 1], [0, 0, 0])
-    assert statistics.of(1) == Standing(2, 0, 0.0, False)
-    assert statistics.of(0) == Standing(1, 2, 2.0, False)
+    assert standing(statistics, 1) == (2, 0, 0.0, False)
+    assert standing(statistics, 0) == (1, 2, 2.0, False)
     step(statistics, [1, 1, 1], [1, 0, 0])
-    assert statistics.of(1) == Standing(2, 1, 1.0, False)
+    assert standing(statistics, 1) == (2, 1, 1.0, False)
     assert list(statistics.returns) == [1, 3]
 
 
 def test_a_sub_env_that_resets_at_once_is_in_its_next_episode():
     statistics = sub_envs_of(AutoresetMode.SAME_STEP)
     step(statistics, [2, 1, 1], [1, 0, 0])
-    assert statistics.of(0) == Standing(2, 0, 0.0, False)
+    assert standing(statistics, 0) == (2, 0, 0.0, False)
     step(statistics, [3, 1, 1], [1, 1, 0])
     assert list(statistics.returns) == [2, 3, 2]
 
@@ -108,10 +111,10 @@ def test_sub_envs_reset_by_a_mask_begin_anew_and_others_go_on():
     step(statistics, [1, 1, 1], [1, 0, 0])
     step(statistics, [5, 6], [0, 1], sub_envs=[1, 2])
     statistics.begin(np.array([True, False, False]))
-    assert [statistics.of(sub_env) for sub_env in range(3)] == [
-        Standing(2, 0, 0.0, False),
-        Standing(1, 2, 6.0, False),
-        Standing(1, 2, 7.0, True),
+    assert [standing(statistics, sub_env) for sub_env in range(3)] == [
+        (2, 0, 0.0, False),
+        (1, 2, 6.0, False),
+        (1, 2, 7.0, True),
     ]
     assert list(statistics.returns) == [1, 7]
 

@@ -323,15 +323,6 @@ def test_a_seed_that_is_too_large_for_atari_is_refused_before_the_reset(client, 
     assert "below 2147483648" in answer.json["message"]
 
 
-def test_an_argument_of_the_vector_implementation_says_so(client):
-    pytest.importorskip("ale_py")
-    refusal = refused(client, env_id="ALE/Pong-v5", kwargs={"reward_clipping": False})
-    assert refusal["message"] == (
-        "Only the vector implementation of ALE/Pong-v5 has an argument 'reward_clipping'"
-    )
-    assert "vector_entry_point" in refusal["hint"]
-
-
 # How many processes ---------------------------------------------------------------------------
 
 
