@@ -6,13 +6,19 @@ import re
 
 _TOKEN = re.compile("[!-~]{16,1024}")
 
-WANTED = "16 to 1,024 visible ASCII characters"
+
+class CannotStartError(Exception):
+    """The server cannot start as it was asked to; the message says why, and has no token."""
 
 
-def fault(token: str) -> str | None:
-    """Return what a token has instead of ``WANTED``, without repeating it; None if it is one."""
+def check(token: str, place: str, hint: str = "") -> None:
+    """Raise ``CannotStartError`` if a text in a place is no token."""
     if _TOKEN.fullmatch(token):
-        return None
+        return
+    found = "more" if len(token) > 1024 else "other characters"
     if len(token) < 16:
-        return f"{len(token)}"
-    return "more" if len(token) > 1024 else "other characters"
+        found = f"{len(token)}"
+    raise CannotStartError(
+        f"{place} must have a token of 16 to 1,024 visible ASCII characters, but it has "
+        f"{found}{hint}"
+    )

@@ -21,13 +21,14 @@ from gym_server.api.watch_keys import PREFIX_VARIABLE
 from gym_server.cli.open_files import allow_many_open_files
 from gym_server.cli.options import parser
 from gym_server.cli.stuck import end_when_stuck
-from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
-from gym_server.cli.users import BadUsersError, make_front
+from gym_server.cli.token_file import VARIABLE, find_token
+from gym_server.cli.users import make_front
 from gym_server.front.handed_over import VARIABLE as FRONT_VARIABLE
 from gym_server.front.handed_over import HandedOver
 from gym_server.http_server.server import Server, bind
 from gym_server.manager.limits import Limits
 from gym_server.processes import start
+from gym_server.tokens import CannotStartError
 
 log = logging.getLogger("gym_server")
 
@@ -56,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _serve_users(options)
     try:
         token = _find_token(options)
-    except BadTokenError as fault:
+    except CannotStartError as fault:
         return _fail(str(fault))
     except OSError as error:
         return _fail(f"the file {options.token_file} cannot be read: {error.strerror or error}")
@@ -114,7 +115,7 @@ def _serve_users(options: argparse.Namespace) -> int:
     with listener:
         try:
             front = make_front(options, listener)
-        except BadUsersError as fault:
+        except CannotStartError as fault:
             return _fail(str(fault))
         _begin(options, front.port, front.stop)
         front.run()
@@ -138,7 +139,7 @@ def _begin(options: argparse.Namespace, port: int, stop: Callable[[], None]) -> 
 
 def _find_token(options: argparse.Namespace) -> str | None:
     if options.no_auth and options.token_file is not None:
-        raise BadTokenError("--no-auth and --token-file exclude each other")
+        raise CannotStartError("--no-auth and --token-file exclude each other")
     token = find_token(options.token_file, os.environ)
     return None if options.no_auth else token
 

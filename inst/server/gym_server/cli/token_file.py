@@ -15,10 +15,6 @@ log = logging.getLogger(__name__)
 VARIABLE = "GYM_SERVER_TOKEN"
 
 
-class BadTokenError(Exception):
-    """The given token is not valid; the message does not contain it."""
-
-
 def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | None:
     """Return the server's token, or None.
 
@@ -28,7 +24,7 @@ def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | No
             environment starts do not inherit it.
 
     Raises:
-        BadTokenError: the token is not valid.
+        CannotStartError: the token is not valid.
         OSError: the file cannot be read.
     """
     of_variable = environ.pop(VARIABLE, "")
@@ -40,9 +36,7 @@ def find_token(file: Path | None, environ: MutableMapping[str, str]) -> str | No
 
 def _checked(text: str, place: str) -> str:
     token = text.strip()
-    fault = tokens.fault(token)
-    if fault is not None:
-        raise BadTokenError(f"{place} must contain a token of {tokens.WANTED}, but it has {fault}")
+    tokens.check(token, place)
     return token
 
 

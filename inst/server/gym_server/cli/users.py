@@ -10,25 +10,22 @@ from gym_server.api.access import is_loopback
 from gym_server.cli.token_file import VARIABLE
 from gym_server.front.folders import Folders
 from gym_server.front.front import Front
-from gym_server.front.starts import ShareError, Starts
-from gym_server.front.users_file import UsersFile, UsersFileError
+from gym_server.front.starts import Starts
+from gym_server.front.users_file import UsersFile
 from gym_server.manager.limits import Limits
-
-
-class BadUsersError(Exception):
-    """The front cannot start; the message says how to change that."""
+from gym_server.tokens import CannotStartError
 
 
 def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
     """Return the front that the options of the command line describe.
 
     Raises:
-        BadUsersError: it cannot start.
+        CannotStartError: it cannot start.
     """
     if os.name != "posix":
-        raise BadUsersError("--users needs Linux or macOS; on Windows, start a server a user")
+        raise CannotStartError("--users needs Linux or macOS; on Windows, start a server a user")
     if options.no_auth or options.token_file is not None:
-        raise BadUsersError(
+        raise CannotStartError(
             "--users has the token of each user, so it excludes --no-auth and --token-file"
         )
     # A token in the variable is not meant for this server.
@@ -37,7 +34,7 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
         users = UsersFile(options.users)
         folders = Folders(options.monitor_dir)
         if options.allow_module and not folders.separate:
-            raise BadUsersError(
+            raise CannotStartError(
                 "--allow-module would let users act on each other's servers, which run under one "
                 "account here; start it as root, with a Python that all accounts can run, or leave "
                 "it out"
@@ -50,10 +47,8 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
             None if options.max_processes == Limits.max_processes else options.max_processes,
             options.max_rollout_processes,
         )
-    except (UsersFileError, ShareError) as error:
-        raise BadUsersError(str(error)) from None
     except OSError as error:
-        raise BadUsersError(
+        raise CannotStartError(
             f"the directory {error.filename} cannot be used: {error.strerror}"
         ) from None
     return Front(listener, users, starts)

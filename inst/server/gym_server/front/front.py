@@ -12,9 +12,10 @@ from selectors import EVENT_READ, DefaultSelector
 
 from gym_server.front import answers
 from gym_server.front.request_head import LARGEST_BYTES, BadHeadError, RequestHead, read_head
-from gym_server.front.starts import ShareError, Starts
+from gym_server.front.starts import Starts
 from gym_server.front.user_server import MOST_WAITING, Client, UserServer
 from gym_server.front.users_file import User, UsersFile
+from gym_server.tokens import CannotStartError
 
 log = logging.getLogger(__name__)
 
@@ -216,7 +217,7 @@ class Front:
             if server is not None and len(server.waiting) < MOST_WAITING:
                 server.add(client)
                 return
-        except (OSError, ShareError) as error:
+        except (OSError, CannotStartError) as error:
             log.warning("A user's server cannot be started: %s", error)
             server = None
         self._refuse(client.socket, self._why_not(head, user, server))

@@ -11,15 +11,12 @@ from gym_server.front.control_groups import ControlGroups
 from gym_server.front.folders import Folders
 from gym_server.memory import machine_mb
 from gym_server.processes.cores import usable_cores
+from gym_server.tokens import CannotStartError
 
 log = logging.getLogger(__name__)
 
 # A server needs this much to begin with, in MiB.
 _LEAST_MB = 128
-
-
-class ShareError(Exception):
-    """The machine is too small for what was asked."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class Starts:
             rollout_processes: those that play whole episodes, besides these; None likewise.
 
         Raises:
-            ShareError: too little memory is left for each.
+            CannotStartError: too little memory is left for each.
         """
         self._folders = folders
         self._arguments = arguments
@@ -99,7 +96,7 @@ class Starts:
         share = self._memory_mb or machine_mb() * 3 // 4 // users
         parts = 1 if self._groups is not None else self._processes
         if share // parts < _LEAST_MB:
-            raise ShareError(
+            raise CannotStartError(
                 f"{share} MiB for each user are too little for {parts} processes of "
                 f"{_LEAST_MB} MiB (one, where there are cgroups); use a larger --max-memory-mb, or "
                 "a smaller --max-processes"
@@ -114,7 +111,7 @@ class Starts:
             users: how many users there are.
 
         Raises:
-            ShareError: too little memory is left for each.
+            CannotStartError: too little memory is left for each.
             OSError: the folder or the control group cannot be made.
         """
         share = self._share_mb(users)

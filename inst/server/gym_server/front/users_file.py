@@ -11,15 +11,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from gym_server import tokens
+from gym_server.tokens import CannotStartError
 
 log = logging.getLogger(__name__)
 
 # A name is also the name of a folder and of a control group.
 _NAME = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,31}")
-
-
-class UsersFileError(Exception):
-    """The file of users cannot be used; the message contains no word of it."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ class UsersFile:
         """Read the file.
 
         Raises:
-            UsersFileError: it cannot be used.
+            CannotStartError: it cannot be used.
         """
         self._file = file
         self._version = self._seen_version()
@@ -71,7 +68,7 @@ class UsersFile:
         before = self.users
         try:
             self.users = read_users(self._file)
-        except UsersFileError as error:
+        except CannotStartError as error:
             log.warning("The users stay as they were: %s", error)
         return self.users != before
 
@@ -89,18 +86,18 @@ def read_users(file: Path) -> tuple[User, ...]:
     """Read the users from a file.
 
     Raises:
-        UsersFileError: it cannot be used. The message names lines by their number only: a word on
+        CannotStartError: it cannot be used. The message names lines by their number only: a word on
             the wrong side of a line may be a token.
     """
     try:
         if file.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-            raise UsersFileError(
+            raise CannotStartError(
                 f"other accounts may read the tokens in {file}; 'chmod 600 {file}' prevents it"
             )
         text = file.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not a text in UTF-8"
-        raise UsersFileError(f"the file {file} cannot be read: {reason}") from None
+        raise CannotStartError(f"the file {file} cannot be read: {reason}") from None
     users: list[User] = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
@@ -108,12 +105,14 @@ def read_users(file: Path) -> tuple[User, ...]:
             user = _read_line(line, place)
             # Some file systems do not distinguish upper and lower case in the names of folders.
             if user.name.lower() in {other.name.lower() for other in users}:
-                raise UsersFileError(f"{place} has a name again; give each user one line")
+                raise CannotStartError(f"{place} has a name again; give each user one line")
             if user.digest in {other.digest for other in users}:
-                raise UsersFileError(f"{place} has a token again; give each user another one")
+                raise CannotStartError(f"{place} has a token again; give each user another one")
             users.append(user)
     if not users:
-        raise UsersFileError(f"the file {file} has no user; write a name and a token on each line")
+        raise CannotStartError(
+            f"the file {file} has no user; write a name and a token on each line"
+        )
     return tuple(users)
 
 
@@ -121,15 +120,10 @@ def _read_line(line: str, place: str) -> User:
     name, *others = line.split()
     if len(others) != 1:
         found = "no token" if not others else "more than a name and a token"
-        raise UsersFileError(f"{place} has {found}; write a name, a space and a token")
+        raise CannotStartError(f"{place} has {found}; write a name, a space and a token")
     if _NAME.fullmatch(name) is None:
-        raise UsersFileError(
+        raise CannotStartError(
             f"{place} must begin with a name of at most 32 letters, digits and '.', '_', '-'"
         )
-    fault = tokens.fault(others[0])
-    if fault is not None:
-        raise UsersFileError(
-            f"{place} must have a token of {tokens.WANTED}, but it has {fault}; "
-            "'openssl rand -hex 16' makes one"
-        )
+    tokens.check(others[0], place, "; 'openssl rand -hex 16' makes one")
     return User(name, sha256(others[0].encode()).digest())

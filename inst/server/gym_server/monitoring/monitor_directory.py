@@ -52,6 +52,8 @@ class MonitorRoot:
         Raises:
             GymServerError: ``monitor_directory`` if monitors may not write there.
         """
+        if ".." in Path(directory).parts:
+            raise _refuse(directory, "it contains '..'")
         try:
             # Resolve links before comparing, so that none leads outside.
             own = self._find_root()

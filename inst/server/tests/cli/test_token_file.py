@@ -2,7 +2,8 @@ import os
 
 import pytest
 
-from gym_server.cli.token_file import VARIABLE, BadTokenError, find_token
+from gym_server.cli.token_file import VARIABLE, find_token
+from gym_server.tokens import CannotStartError
 
 TOKEN = "correct-horse-battery"
 
@@ -35,12 +36,12 @@ def test_the_variable_holds_it_where_there_is_no_file(tmp_path):
     "text", [b"", b"short", b"x" * 15, b"two words are too many", b"x" * 2000, b"\xff" * 20]
 )
 def test_what_is_no_token_is_refused_without_being_shown(tmp_path, text):
-    with pytest.raises(BadTokenError) as caught:
+    with pytest.raises(CannotStartError) as caught:
         find_token(written(tmp_path, text), {})
     assert "16 to 1,024" in str(caught.value)
     assert not text.strip() or text.decode("latin-1") not in str(caught.value)
     if text:
-        with pytest.raises(BadTokenError, match=VARIABLE):
+        with pytest.raises(CannotStartError, match=VARIABLE):
             find_token(None, {VARIABLE: text.decode("latin-1")})
 
 

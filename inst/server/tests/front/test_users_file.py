@@ -4,7 +4,8 @@ import os
 import pytest
 from front_process import write_users
 
-from gym_server.front.users_file import UsersFile, UsersFileError, read_users
+from gym_server.front.users_file import UsersFile, read_users
+from gym_server.tokens import CannotStartError
 
 ANNA, BEN = "a" * 16, "b" * 1024
 
@@ -60,7 +61,7 @@ def test_the_token_is_compared_with_that_of_every_user_in_constant_time(file, mo
 def test_what_is_no_users_file_is_refused_without_a_word_of_it(file, text, words):
     file.write_text(text)
     file.chmod(0o600)
-    with pytest.raises(UsersFileError, match=words) as caught:
+    with pytest.raises(CannotStartError, match=words) as caught:
         read_users(file)
     message = str(caught.value).replace(str(file), "")
     for word in text.split():
@@ -71,16 +72,16 @@ def test_what_is_no_users_file_is_refused_without_a_word_of_it(file, text, words
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660])
 def test_a_file_that_others_can_read_is_refused_with_the_fix(file, mode):
     write_users(file, mode=mode, anna=ANNA)
-    with pytest.raises(UsersFileError, match=f"'chmod 600 {file}'"):
+    with pytest.raises(CannotStartError, match=f"'chmod 600 {file}'"):
         read_users(file)
 
 
 def test_a_file_that_cannot_be_read_is_refused(file):
-    with pytest.raises(UsersFileError, match="No such file"):
+    with pytest.raises(CannotStartError, match="No such file"):
         read_users(file)
     file.write_bytes(b"anna \xff")
     file.chmod(0o600)
-    with pytest.raises(UsersFileError, match="UTF-8"):
+    with pytest.raises(CannotStartError, match="UTF-8"):
         read_users(file)
 
 
