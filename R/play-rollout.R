@@ -32,21 +32,6 @@
 #' [provenance()] names the way. `vignette("playing", package = "gym")` has details, and explains
 #' how to start an episode of the result again.
 #'
-#' # Steps as arrays
-#'
-#' Learning algorithms often need the steps by time, for all sub-environments at once. With
-#' `steps = "arrays"` the result is a list of arrays. Their first dimension is the time and their
-#' second the sub-environment:
-#' * `observation` and, on request, `next_observation`: followed by the dimensions of an
-#'   observation, such as 120 x 16 x 4,
-#' * `action`: followed by the dimensions of an action, none for a Discrete space,
-#' * `reward` (double), `terminated`, `truncated` (logical), `episode` and, with several policies,
-#'   `candidate` (integer): matrices.
-#'
-#' The episodes of a sub-environment follow one another. If it has played fewer steps than another,
-#' its arrays end with `NA`. Tuple and Dict have a list with an array for each part. Sequence, Graph
-#' and OneOf have no arrays.
-#'
 #' @param env The environment: an id, such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]), or
 #'   an environment made by [gym_make()], with or without sub-environments.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of many
@@ -65,7 +50,7 @@
 #' @param seed A whole number of at most 2^53 that fixes all random numbers, for any [RNGkind()] of
 #'   the session. The session's generator is left as it was. `NULL`, the default, draws a seed from
 #'   the session's generator.
-#' @param steps Keep each step? `FALSE`, the default, `TRUE` for a table, or `"arrays"`.
+#' @param steps Keep each step, in a table? `FALSE`, the default, or `TRUE`.
 #' @param client The client of the server that makes an environment given by its id. The default is
 #'   the session's client, [gym_client()].
 #' @param frames Keep frames of the episodes? `FALSE`, the default, or `TRUE`, for [animate()] and
@@ -74,8 +59,8 @@
 #' @param ... Arguments of the environment, by name, such as `is_slippery = FALSE` for FrozenLake,
 #'   if it is given by its id.
 #' @param num_envs The number of sub-environments, a whole number, if the environment is given by
-#'   its id. If the server plays whole episodes, it only numbers them in the column `sub_env` and
-#'   shapes the arrays. `NULL`, the default, chooses, see [as_vector_env()].
+#'   its id. If the server plays whole episodes, it only numbers them in the column `sub_env`.
+#'   `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step, in columns whose names begin with
 #'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only with `steps`. At the
 #'   end of an episode it is that episode's last observation.
@@ -99,8 +84,7 @@
 #'       columns named as in Gymnasium's documentation, such as `pole_angle`, otherwise `obs_1`,
 #'       `obs_2`, ..., with the keys of a Dict such as `obs_position_1`), `action` (or `action_1`,
 #'       `action_2`, ...), `reward` (double), `terminated`, `truncated` (logical), and with
-#'       `next_observation = TRUE` the observation after the step. With `steps = "arrays"` an object
-#'       of class `gym_arrays`, see below.}
+#'       `next_observation = TRUE` the observation after the step.}
 #'     \item{frames}{`NULL`, or with `frames = TRUE` a list with the frames of each episode, an
 #'       object of class `gym_frames`. They are kept as PNG files of a few kilobytes each.
 #'       `frames[[2]][[1]]` unpacks the first frame of the second episode in the form of
@@ -134,16 +118,11 @@
 #' played <- rollout("CartPole-v1", follow_pole, episodes = 2, seed = 1, steps = TRUE)
 #' head(as.data.frame(played))
 #'
-#' # The returns from each step on, discounted by 0.99, in all sub-environments at once.
-#' arrays <- rollout("CartPole-v1", follow_pole, episodes = 20, seed = 1, steps = "arrays")$steps
-#' arrays
-#' from_here <- arrays$reward
-#' ended <- arrays$terminated | arrays$truncated
-#' for (time in rev(seq_len(nrow(ended) - 1))) {
-#'   later <- ifelse(ended[time, ], 0, from_here[time + 1, ])
-#'   from_here[time, ] <- arrays$reward[time, ] + 0.99 * later
+#' # The return from each step on, discounted by 0.99.
+#' discounted <- function(reward) {
+#'   Reduce(function(now, later) now + 0.99 * later, reward, accumulate = TRUE, right = TRUE)
 #' }
-#' from_here[1, ]
+#' head(with(played$steps, ave(reward, episode, FUN = discounted)))
 #'
 #' # Start the second episode again.
 #' second <- played$episodes[2, ]
@@ -193,14 +172,15 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
 }
 
 check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {
-  if (!rlang::is_bool(steps) && !identical(steps, "arrays")) {
-    abort_argument(steps, "TRUE, FALSE or \"arrays\"", "steps", call)
+  if (identical(steps, "arrays")) {
+    abort_defunct("`steps = TRUE` keeps the steps in a table", "`steps = \"arrays\"`", call)
   }
+  check_flag(steps, call = call)
   check_flag(next_observation, call = call)
-  if (next_observation && isFALSE(steps)) {
+  if (next_observation && !steps) {
     gym_abort(
       c("`next_observation = TRUE` needs the steps to be kept.",
-        i = "Add `steps = TRUE`, or `steps = \"arrays\"`."),
+        i = "Add `steps = TRUE`."),
       class = "gym_error_argument", argument = "next_observation", value = TRUE, call = call
     )
   }
@@ -208,11 +188,8 @@ check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env
 
 play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, seed, steps,
                          next_observation, progress) {
-  if (identical(steps, "arrays")) {
-    check_fits_arrays(vector_env)
-  }
   policy <- policy_bind(policy, vector_env, call = vector_env$call)
-  vector_env <- env_for_policy(vector_env, policy, max_steps %||% Inf, !isFALSE(steps))
+  vector_env <- env_for_policy(vector_env, policy, max_steps %||% Inf, steps)
   history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
   origin <- new_provenance(vector_env, list(seed = seed), started = NULL)
   result <- function(interrupted = FALSE) {
@@ -225,7 +202,7 @@ play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, se
       play_batches(
         vector_env, history, function(candidates) policy_subset(policy, candidates),
         report = function(ended) show(history$played_episodes + ended),
-        max_steps = max_steps %||% Inf, keep_steps = !isFALSE(steps), keep_next = next_observation
+        max_steps = max_steps %||% Inf, keep_steps = steps, keep_next = next_observation
       ),
       "Interrupted after {finished} of {total} episode{?s}; the finished ones are returned.",
       function() history$played_episodes, total
@@ -247,12 +224,11 @@ new_rollout <- function(history, policy, vector_env, origin, steps, next_observa
   several <- !is.null(count_candidates(policy))
   episodes <- episodes_table(history$batches, several)
   fps <- vector_env$spec$render_fps
-  keep <- if (identical(steps, "arrays")) steps_arrays else steps_table
   structure(
     list(
       episodes = episodes,
-      steps = if (!isFALSE(steps) && nrow(episodes)) {
-        keep(history$batches, episodes, vector_env, several, next_observation)
+      steps = if (steps && nrow(episodes)) {
+        steps_table(history$batches, episodes, vector_env, several, next_observation)
       },
       frames = if (!is.null(vector_env$frame)) {
         lapply(unlist(lapply(history$batches, function(batch) batch$frames), recursive = FALSE),
@@ -271,7 +247,7 @@ new_rollout <- function(history, policy, vector_env, origin, steps, next_observa
 
 #' @export
 as.data.frame.gym_rollout <- function(x, row.names = NULL, optional = FALSE, ...) {
-  if (is.data.frame(x$steps)) x$steps else x$episodes
+  x$steps %||% x$episodes
 }
 
 #' @rdname rollout

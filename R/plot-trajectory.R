@@ -187,10 +187,9 @@ episode_row <- function(x, episode, candidate, call) {
 }
 
 check_steps <- function(x, call) {
-  if (!is.data.frame(x$steps)) {
-    kept <- if (is.null(x$steps)) "without its steps being kept" else "with its steps in arrays"
+  if (is.null(x$steps)) {
     gym_abort(
-      c(paste0("This rollout was played ", kept, "."),
+      c("This rollout was played without its steps being kept.",
         i = "`rollout(..., steps = TRUE)` keeps them in a table."),
       class = "gym_error_argument", argument = "x", value = x, call = call
     )

@@ -246,7 +246,7 @@ test_that("results are the same however many episodes a request has, and how man
       played("CartPole-v1", list(policy_random(), linear(4, 1)), 300, seed = 2, max_steps = 30,
              client = client),
       played("Acrobot-v1", policy_candidates(linear(6, 3), rbind(sin(1:18), cos(1:18))), 9,
-             seed = 3, max_steps = 20, steps = "arrays", client = client)
+             seed = 3, max_steps = 20, steps = TRUE, client = client)
     )
   }
   whole <- play()

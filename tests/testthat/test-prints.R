@@ -87,25 +87,6 @@ test_that("a rollout and its summary", {
   expect_printed(summary(played))
 })
 
-test_that("the steps of a rollout in arrays", {
-  numbers <- fake_vector_env(4, id = "CartPole-v1")
-  parts <- fake_vector_env(2, observation_space = new_space(describe_dict(
-    place = describe_box(c(0, 0), c(1, 1)), word = list(name = "Discrete", n = 3L)
-  )))
-  parts$reset <- function(seed, options) list(place = cbind(1:2, 2:1) / 2, word = 0:1)
-  parts$step <- function(action, which = 1:2) {
-    n <- length(which)
-    place <- cbind(1:2, 2:1)[which, , drop = FALSE] / 2
-    list(observation = list(place = place, word = (0:1)[which]), reward = rep(1, n),
-         terminated = rep(TRUE, n), truncated = logical(n))
-  }
-  keep <- function(env, ...) rollout(env, ..., episodes = 10, seed = 1, steps = "arrays")$steps
-  expect_snapshot({
-    print(keep(numbers, policy_random()))
-    print(keep(parts, list(policy_random(), policy_random()), next_observation = TRUE))
-  })
-})
-
 test_that("rollouts and evaluations of several policies", {
   network <- policy_network(c(4, 1), weights = list(matrix(c(1, -1, 1, -1), 1)))
   policies <- list(network = network, random = policy_random())

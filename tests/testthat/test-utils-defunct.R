@@ -6,6 +6,11 @@ test_that("a function that has ended names what replaces it", {
                class = "gym_error_defunct")
 })
 
+test_that("steps as arrays have ended, before anything is played", {
+  expect_error(rollout("CartPole-v1", policy_random(), steps = "arrays"), "`steps = TRUE`",
+               class = "gym_error_defunct")
+})
+
 test_that("a class that inherits from GymEnv names what replaces it", {
   walk <- R6::R6Class("Walk", inherit = GymEnv, public = list(reset = function() 0))
   cnd <- expect_error(walk$new(), "The class GymEnv has ended", class = "gym_error_defunct")
