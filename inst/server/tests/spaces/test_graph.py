@@ -45,12 +45,12 @@ def test_there_may_be_no_nodes():
     [
         (but(nodes=[[0, 1], [0, "x"]]), '"x" at $nodes[1][1] is not in Box'),
         (but(edges=[2, 3]), "3 at $edges[1] is not in Discrete(3)"),
-        (but(edge_links=[[0, 1], [1, 2]]), "2 at $edge_links[1][1] is not in Graph"),
-        (but(edge_links=[[0, 1], [1, -1]]), "-1 at $edge_links[1][1] is not in Graph"),
-        (but(edge_links=[[0, 1], [1, 0.5]]), "0.5 at $edge_links[1][1] is not in Graph"),
-        (but(edge_links=[[0, 1], [1]]), "[1] at $edge_links[1] is not in Graph"),
-        (but(edge_links=[[0, 1], 1]), "1 at $edge_links[1] is not in Graph"),
-        (but(nodes={}), "{} at $nodes is not in Graph"),
+        (but(edge_links=[[0, 1], [1, 2]]), "2 at $edge_links[1][1] is not in MultiDiscrete"),
+        (but(edge_links=[[0, 1], [1, -1]]), "-1 at $edge_links[1][1] is not in MultiDiscrete"),
+        (but(edge_links=[[0, 1], [1, 0.5]]), "0.5 at $edge_links[1][1] is not in MultiDiscrete"),
+        (but(edge_links=[[0, 1], [1]]), "[[0, 1], [1]] at $edge_links is not in MultiDiscrete"),
+        (but(edge_links=[[0, 1], 1]), "[[0, 1], 1] at $edge_links is not in MultiDiscrete"),
+        (but(nodes={}), "{} is not in Graph"),
     ],
 )
 def test_what_is_no_member_is_refused_with_its_place(value, words):
@@ -61,6 +61,8 @@ def test_what_is_no_member_is_refused_with_its_place(value, words):
     ("value", "reason"),
     [
         ({}, "it has no nodes"),
+        (but(nodes=[]), "it has no nodes"),
+        (but(nodes={}), "nodes must be a list"),
         ([], "an object of nodes, edges and edge_links is needed"),
         (but(weights=[1]), "an object of nodes, edges and edge_links is needed"),
         (but(edges=None), "each edge needs a link, and each link an edge"),
