@@ -145,17 +145,14 @@ def _check(config: EnvConfig, num_envs: int, max_num_envs: int) -> None:
 
 
 def _check_num_workers(config: EnvConfig, num_workers: int, num_envs: int) -> None:
-    wanted = {
-        "sync": "0 with vectorization_mode 'sync', whose sub-environments run in the server's "
-        "process",
-        "async": "at least 1 with vectorization_mode 'async'",
-        "vector_entry_point": "left out with vectorization_mode 'vector_entry_point', which runs "
-        "in the server's process",
-    }
     fits = {"sync": num_workers == 0, "async": num_workers > 0, "vector_entry_point": False}
     mode = config.vectorization_mode
     if mode is not None and not fits[mode]:
-        raise invalid_parameter("num_workers", num_workers, wanted[mode])
+        wanted = (
+            "0 with vectorization_mode 'sync', at least 1 with 'async', and left out with "
+            "'vector_entry_point', which runs in the server's process"
+        )
+        raise invalid_parameter("num_workers", num_workers, wanted)
     if num_workers > num_envs:
         raise invalid_parameter(
             "num_workers", num_workers, f"at most {num_envs}, the number of sub-environments"

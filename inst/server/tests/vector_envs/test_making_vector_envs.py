@@ -371,8 +371,11 @@ def test_processes_are_used_where_they_pay(client, monkeypatch, fields, mode, nu
         ({"num_workers": 1.5}, "must be an integer, 0 or greater, not 1.5"),
         ({"num_workers": 3}, "must be at most 2, the number of sub-environments, not 3"),
         ({"num_workers": 1, "vectorization_mode": "sync"}, "must be 0 with vectorization_mode"),
-        ({"num_workers": 0, "vectorization_mode": "async"}, "must be at least 1 with"),
-        ({"num_workers": 1, "vectorization_mode": "vector_entry_point"}, "must be left out with"),
+        ({"num_workers": 0, "vectorization_mode": "async"}, "at least 1 with 'async', and"),
+        (
+            {"num_workers": 1, "vectorization_mode": "vector_entry_point"},
+            "and left out with",
+        ),
         ({"num_workers": 1, "num_envs": None}, "The parameter 'num_workers' is for vector env"),
     ],
 )
