@@ -26,8 +26,7 @@ session_client <- function(install = TRUE, call = rlang::caller_env()) {
     return(named_client(url, call))
   }
   if (is.null(the_session$client) || !is_running(the_session$client$remote_base)) {
-    options <- as.list(the_session$server_options)
-    the_session$client <- start_server(options = options, install = install, call = call)
+    the_session$client <- start_server(install = install, call = call)
   }
   the_session$client
 }

@@ -62,7 +62,7 @@ do_task <- function(task) {
       take_session_objects(task$session)
       # As many processes play beside the environment as future gives the worker cores: normally
       # one.
-      the_session$server_options$max_rollout_processes <- parallelly::availableCores()[[1L]]
+      the_session$cores <- parallelly::availableCores()[[1L]]
       with_own_server(list(value = run_task(task)))
     },
     error = function(cnd) {

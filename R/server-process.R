@@ -95,6 +95,7 @@ server_environment <- function() {
     PYTHONUNBUFFERED = "1",
     # R's library may belong to another user; write nothing there.
     PYTHONDONTWRITEBYTECODE = "1",
+    PYTHON_CPU_COUNT = the_session$cores,
     own_library_path()
   )
 }

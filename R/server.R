@@ -26,13 +26,12 @@ is_running <- function(base) {
 #' @param python Path of a Python 3.10 or newer, a string, or `NULL`.
 #' @param ... Further options of the server, by name: `monitor_dir = "runs"` means
 #'   `--monitor-dir runs`.
-#'   * `log_level = "info"` logs what is made and closed.
 #'   * `allow_module = c("a", "b")` names Python modules whose environments may be made.
 #'   * `token_file = "token"` names a file with a token of 16 characters or more, which replaces the
 #'   server's own one.
-#'   * Limits (with their defaults): `max_processes` (of environments, 128), `max_rollout_processes`
-#'   (that play whole episodes, one per core) and `max_memory_mb` (of the server's process, and of
-#'   each of its processes, on Linux; three quarters of the machine's).
+#'   * Limits (with their defaults): `max_processes` (of environments, 128; besides these as many play
+#'   whole episodes, but no more than one per core) and `max_memory_mb` (of the server's process, and
+#'   of each of its processes, on Linux; three quarters of the machine's).
 #'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
 #'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an
 #'   unused environment is removed (1,440; 0 for never).
@@ -159,10 +158,10 @@ installed_extra_hint <- function(extra, python) {
   }
 }
 
-# Options as a command line: log_level = "info" becomes --log-level info, TRUE a flag, and a vector
+# Options as a command line: monitor_dir = "runs" becomes --monitor-dir runs, TRUE a flag, and a vector
 # one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
-  check_dots_named(options, "log_level = \"info\"", call = call)
+  check_dots_named(options, "monitor_dir = \"runs\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
   unlist(Map(
     function(flag, values) {
@@ -215,7 +214,7 @@ gym_server_stop <- function(client = NULL) {
 #' @inheritSection gym_server_stop Errors
 #' @export
 #' @examplesIf gym:::can_start_server()
-#' server <- gym_server_start(log_level = "info")
+#' server <- gym_server_start()
 #' gym_server_log(server)
 #' gym_server_stop(server)
 gym_server_log <- function(client = NULL) {

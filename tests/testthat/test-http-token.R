@@ -177,7 +177,7 @@ test_that("what cannot stand in a header is no token", {
 
 test_that("the server's log does not show the token", {
   skip_unless_all()
-  server <- local_locked_server(log_level = "debug")
+  server <- local_locked_server()
   env <- local_env(client = server)
   env$reset()
   try(env_create(server, "bad string"), silent = TRUE)

@@ -269,8 +269,9 @@ test_that("a training is the same with any number of processes, through broken c
       iterations = 3, seed = 3, eval_episodes = 10, eval_every = 2, max_steps = 60, client = client
     ))
   }
-  alone <- train(local_server(max_rollout_processes = 1))
-  several <- local_server(max_rollout_processes = 3)
+  alone <- train(local_server(max_processes = 1))
+  withr::local_envvar(PYTHON_CPU_COUNT = 3)
+  several <- local_server()
   expect_identical(train(several), alone)
   expect_identical(train(local_cut_rollouts(several, "answered")), alone)
 })

@@ -61,7 +61,7 @@ test_that("a worker's server plays in as many processes as future gives the work
   asked <- lapply(1:2, function(i) {
     future::future({
       Sys.sleep(0.3)
-      utils::getFromNamespace("the_session", "gym")$server_options$max_rollout_processes
+      utils::getFromNamespace("the_session", "gym")$cores
     }, lazy = FALSE)
   })
   counts <- unlist(lapply(asked, future::value))

@@ -1,5 +1,5 @@
 test_that("a server starts on a free port, has a log and stops", {
-  server <- local_server(log_level = "info")
+  server <- local_server()
   env_close(server, env_create(server, "CartPole-v1"))
   expect_match(gym_server_log(server), "CartPole-v1", all = FALSE)
   expect_s3_class(server, "GymClient")
@@ -25,8 +25,8 @@ test_that("a server that ended without memory names the option that gives it mor
 
 test_that("options of the server are written as the command line reads them", {
   expect_identical(
-    server_options(list(max_memory_mb = 1e5, log_level = "info", no_auth = TRUE, off = FALSE)),
-    c("--max-memory-mb", "100000", "--log-level", "info", "--no-auth")
+    server_options(list(max_memory_mb = 1e5, monitor_dir = "runs", no_auth = TRUE, off = FALSE)),
+    c("--max-memory-mb", "100000", "--monitor-dir", "runs", "--no-auth")
   )
   expect_identical(
     server_options(list(allow_module = c("a", "b"))),

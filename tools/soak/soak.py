@@ -133,8 +133,7 @@ def main(seconds: float) -> int:
     """Run the test on a server; return the exit status."""
     reaps = "--idle-minutes" in _help()
     options = ("--idle-minutes", str(IDLE_MINUTES)) if reaps else ()
-    # Environments raise errors on purpose here.
-    server = ServerProcess("--log-level", "error", *options)
+    server = ServerProcess(*options)
     watcher = Client(server.port)
     slots = [Slot(server.port, number < 2, random.Random(number)) for number in range(AT_ONCE)]
     held = {}

@@ -93,6 +93,11 @@ class GymServerError(Exception):
         """Return a copy to raise: raising the same error again lengthens its traceback."""
         return GymServerError(self.code, self.message, self.hint, self.extra)
 
+    def __reduce__(self) -> tuple:
+        # What was raised in another process, from which it comes as a pickle, was logged there.
+        parts = self.code, self.message, self.hint, self.extra
+        return GymServerError, parts, {"is_logged": True}
+
     @property
     def headers(self) -> tuple[tuple[str, str], ...]:
         """Additional headers of the response."""
@@ -216,15 +221,11 @@ def body_too_large() -> GymServerError:
     )
 
 
-def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
-    """Turn any exception into a status and a response body.
+def logged(error: BaseException) -> GymServerError:
+    """Turn any exception into an error of the server; log what an administrator may want to see.
 
     Args:
-        error: a GymServerError, one of werkzeug's HTTP errors, or a bug in the server, which is
-            logged.
-
-    Returns:
-        The HTTP status and ``{"message", "code", "documentation_url", "hint"?, "extra"?}``.
+        error: a GymServerError, one of werkzeug's HTTP errors, or a bug in the server.
     """
     if isinstance(error, HTTPException):
         error = _from_http(error)
@@ -240,6 +241,16 @@ def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
         )
     elif error.code in ("environment_error", "too_much_memory") and not error.is_logged:
         log.warning("%s", error.message, exc_info=error)
+    return error
+
+
+def answer_to(error: BaseException) -> tuple[int, dict[str, str]]:
+    """Turn any exception into a status and a response body; see ``logged()``.
+
+    Returns:
+        The HTTP status and ``{"message", "code", "documentation_url", "hint"?, "extra"?}``.
+    """
+    error = logged(error)
     body = {
         "message": error.message,
         "code": error.code,

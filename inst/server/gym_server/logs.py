@@ -15,15 +15,14 @@ from typing import TextIO
 _GYMNASIUM = r"(\x1b\[\d+m)?WARN: "
 
 
-def set_up(level: str | int, about_process: str = "") -> None:
+def set_up(about_process: str = "") -> None:
     """Log to standard error.
 
     Args:
-        level: the lowest level to log.
         about_process: what each line says about its process, as a ``logging`` format.
     """
     form = f"%(asctime)s %(levelname)s %(name)s{about_process}: %(message)s"
-    logging.basicConfig(level=level, format=form)
+    logging.basicConfig(level=logging.INFO, format=form)
     # Each time, and not once in the life of a process: each client is to get them.
     warnings.filterwarnings("always", _GYMNASIUM)
     # Gymnasium's recorder finds the directory that a monitor has made for it.

@@ -187,7 +187,7 @@ def serve():
 @pytest.fixture(scope="module")
 def _server_of_a_file():
     # Nobody reads its log, which would fill the pipe.
-    server = ServerProcess(*ON_A_FREE_PORT, "--log-level", "error")
+    server = ServerProcess(*ON_A_FREE_PORT, stderr=subprocess.DEVNULL)
     yield server
     server.kill()
 

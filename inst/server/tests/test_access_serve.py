@@ -3,6 +3,7 @@
 import http.client
 import json
 import os
+import subprocess
 from contextlib import closing
 
 import pytest
@@ -24,7 +25,7 @@ def token_file(tmp_path):
 @pytest.fixture(scope="module")
 def locked():
     """Start a server with the token of the environment variable."""
-    server = ServerProcess(*ON_A_FREE_PORT, "--log-level", "error", GYM_SERVER_TOKEN=TOKEN)
+    server = ServerProcess(*ON_A_FREE_PORT, stderr=subprocess.DEVNULL, GYM_SERVER_TOKEN=TOKEN)
     yield server
     server.kill()
 

@@ -243,7 +243,7 @@ def test_slow_clients_hold_nobody_up(ask, attacked):
 
 
 def test_the_token_is_in_no_answer_and_no_log(serve):
-    server = serve("--log-level", "debug", GYM_SERVER_TOKEN=TOKEN)
+    server = serve(GYM_SERVER_TOKEN=TOKEN)
     answers = []
     for path in ("/v1/health/", "/nowhere", "/v1/envs/00000000/", "/v1/registry/"):
         for headers in ({}, {"Authorization": f"Bearer {TOKEN}"}, {"Authorization": TOKEN}):
@@ -261,4 +261,4 @@ def test_the_token_is_in_no_answer_and_no_log(serve):
         answers.append(connection.getresponse().read().decode())
     _, output, errors = server.stop() if os.name == "posix" else (0, "", "")
     assert not any(TOKEN in text for text in (*answers, output, errors))
-    assert "Refused a request from 127.0.0.1 without a token" in errors or os.name != "posix"
+    assert "127.0.0.1 sent requests without a token" in errors or os.name != "posix"

@@ -1,6 +1,7 @@
 """Any exception of an environment becomes a response, which is stored for repetitions."""
 
 import signal
+import subprocess
 
 import pytest
 from conftest import ServerProcess
@@ -14,7 +15,7 @@ KINDS = {"interrupts": "KeyboardInterrupt", "leaves": "SystemExit", "ends_a_gene
 def server():
     options = {"--port": "0", "--allow-module": "faulty_envs"}
     # Nobody reads its log, which would fill the pipe.
-    process = ServerProcess(*sum(options.items(), ()), "--log-level", "error")
+    process = ServerProcess(*sum(options.items(), ()), stderr=subprocess.DEVNULL)
     yield process
     process.kill()
 

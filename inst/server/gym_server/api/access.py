@@ -5,19 +5,17 @@ from __future__ import annotations
 import contextlib
 import hmac
 import ipaddress
-import logging
 import re
 import socket
 from collections.abc import Collection
 from dataclasses import dataclass
 from urllib.parse import parse_qs
 
+from gym_server import logs
 from gym_server.api.routing import Callers, Match
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.errors import GymServerError, malformed_request
 from gym_server.json_values import brief
-
-log = logging.getLogger(__name__)
 
 # A name or an address, optionally with a port.
 _AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+?)\.?(?::([0-9]*))?")
@@ -160,7 +158,8 @@ class Guard:
             key = parse_qs(environ.get("QUERY_STRING", "")).get("key", [""])[0]
             if self._watch_keys.opens(key, match.variables["instance_id"]):
                 return
-        log.info("Refused a request from %s without a token", environ.get("REMOTE_ADDR"))
+        # Once for each address, so that strangers do not fill the log.
+        logs.warn_once(__name__, f"{environ.get('REMOTE_ADDR')} sent requests without a token")
         raise _unauthorized(key, "HTTP_AUTHORIZATION" in environ)
 
 

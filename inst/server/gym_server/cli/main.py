@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status: 0 after a stop, 1 if the server cannot start.
     """
     options = parser().parse_args(argv)
-    logs.set_up(options.log_level.upper())
+    logs.set_up()
     if options.users is not None:
         return _serve_users(options)
     try:

@@ -30,12 +30,6 @@ def parser() -> argparse.ArgumentParser:
         help="port; 0 picks a free one (%(default)s)",
     )
     options.add_argument(
-        "--log-level",
-        default="warning",
-        choices=("debug", "info", "warning", "error"),
-        help="lowest level to log to standard error (%(default)s)",
-    )
-    options.add_argument(
         "--stop-on-stdin-eof", action="store_true", help="stop when standard input closes"
     )
     options.add_argument(
@@ -67,12 +61,8 @@ def _add_limits(options: argparse.ArgumentParser) -> None:
     add(
         "max_processes",
         _number(1, 100_000),
-        "processes that run sub-environments, of all environments (%(default)s)",
-    )
-    add(
-        "max_rollout_processes",
-        _number(1, 1_000),
-        "processes that play whole episodes, besides these (one per core)",
+        "processes that run sub-environments, of all environments, and besides these as many that "
+        "play whole episodes, but no more than cores (%(default)s)",
     )
     limits.add_argument(
         "--max-memory-mb",
@@ -108,11 +98,14 @@ _ENDED = {
     "--allow-path": "the user of a server with a token may name any file",
     "--isolate": "the server serves one user, and environments play in its own process; for a "
     "class, --users FILE starts a server for each user",
+    "--log-level": "the log has everything, and each line its level",
     "--max-body-mb": "a request may have 16 MiB",
     "--max-instances": "a server may have 1,000 environments; --max-memory-mb limits its memory",
     "--max-monitor-mb": "the server's user looks after the disk; a service can have a quota",
     "--max-num-envs": "an environment may have 100,000 sub-environments; --max-memory-mb limits "
     "the server's memory",
+    "--max-rollout-processes": "--max-processes limits them too; otherwise there is one a core, "
+    "and the variable PYTHON_CPU_COUNT can say how many cores",
     "--max-total-sub-envs": "--max-memory-mb limits the server's memory",
     "--max-watchers": "every watch page is one of the server's user",
     "--max-worker-mb": "--max-memory-mb limits the server",

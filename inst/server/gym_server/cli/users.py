@@ -45,7 +45,6 @@ def make_front(options: argparse.Namespace, listener: socket.socket) -> Front:
             _arguments(options),
             options.max_memory_mb,
             None if options.max_processes == Limits.max_processes else options.max_processes,
-            options.max_rollout_processes,
         )
     except OSError as error:
         raise CannotStartError(
@@ -59,13 +58,10 @@ def _arguments(options: argparse.Namespace) -> list[str]:
     hosts = list(options.allow_host)
     if not is_loopback(options.host):
         hosts.append(socket.getfqdn())
-    rollouts = options.max_rollout_processes
     return [
         *(f"--allow-host={name}" for name in hosts),
         *(f"--allow-module={name}" for name in options.allow_module),
-        *(f"--max-rollout-processes={number}" for number in (rollouts,) if number is not None),
         f"--max-call-seconds={options.max_call_seconds}",
         f"--idle-minutes={options.idle_minutes}",
-        f"--log-level={options.log_level}",
         "--monitor-dir=.",
     ]

@@ -46,7 +46,6 @@ class Starts:
         arguments: Sequence[str],
         memory_mb: int | None,
         processes: int | None,
-        rollout_processes: int | None,
     ) -> None:
         """Find out what the system offers, and say what it does not.
 
@@ -56,8 +55,8 @@ class Starts:
             arguments: options of all servers.
             memory_mb: the memory of a user's server with all its processes, in MiB; None for an
                 equal part of three quarters of the machine's.
-            processes: the processes of a user's environments; None for one per core.
-            rollout_processes: those that play whole episodes, besides these; None likewise.
+            processes: the processes of a user's environments; None for one per core. Besides these,
+                as many play whole episodes, but no more than one per core.
 
         Raises:
             CannotStartError: too little memory is left for each.
@@ -67,7 +66,7 @@ class Starts:
         self._memory_mb = memory_mb
         self._environment_processes = own = processes or usable_cores()
         # How many processes a user may have where only each of them is limited.
-        self._processes = 1 + own + min(own, rollout_processes or usable_cores())
+        self._processes = 1 + own + min(own, usable_cores())
         self._groups: ControlGroups | None = None
         reason = None
         try:

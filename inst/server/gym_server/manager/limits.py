@@ -15,12 +15,9 @@ class Limits:
     Attributes:
         max_instances: the number of environments.
         max_num_envs: the number of sub-environments of one environment.
-        max_processes: the number of processes of all environments. Regardless of the number of
-            cores, each takes 7 MB when it is created and 20 MB in use, two threads and 15 files,
-            even when idle. The default suits a class in which everybody has sub-environments
-            in processes.
-        max_rollout_processes: the number of processes that play whole episodes, besides these; None
-            for one per core, but none if max_processes is 0.
+        max_processes: the number of processes of all environments, regardless of the number of
+            cores: each takes 7 MB when it is created and 20 MB in use, two threads and 15 files,
+            even when idle. Besides these, at most as many play whole episodes.
         max_call_seconds: how long a call may take; 0 for no limit.
             The default is longer than ordinary calls, and short enough that the error is there
             after a coffee break.
@@ -31,15 +28,13 @@ class Limits:
     max_instances: int = 1000
     max_num_envs: int = 100_000
     max_processes: int = 128
-    max_rollout_processes: int | None = None
     max_call_seconds: float = 300.0
     idle_minutes: float = 24 * 60.0
 
     @property
     def rollout_processes(self) -> int:
-        """How many processes play whole episodes."""
-        wanted = self.max_rollout_processes
-        return min(usable_cores() if wanted is None else wanted, self.max_processes)
+        """How many processes play whole episodes: at most one per core."""
+        return min(usable_cores(), self.max_processes)
 
     def check_room(self, instances: int, left: int, workers: int) -> None:
         """Refuse an environment for which there is no room.

@@ -23,7 +23,6 @@ class RolloutRequest:
     """Units that a client waits for.
 
     Attributes:
-        number: identifies its task to processes.
         task: what all units have in common.
         function: the function to call in the process: "play" or "describe".
         units: all units.
@@ -34,12 +33,10 @@ class RolloutRequest:
         seconds: the duration of a unit, or None if unknown.
         deaths: how often a process has died while playing a unit.
         failed: the first unit that failed, and the error.
-        turn_ends: when its turn ends, in the clock's seconds; None between turns.
         unwanted_since: since when nobody waits for it, in the clock's seconds.
         over: set when it is done.
     """
 
-    number: int
     task: Task
     function: str
     units: Sequence[Unit]
@@ -50,7 +47,6 @@ class RolloutRequest:
     seconds: float | None = None
     deaths: dict[int, int] = field(default_factory=dict)
     failed: tuple[int, GymServerError] | None = None
-    turn_ends: float | None = None
     unwanted_since: float | None = None
     over: threading.Event = field(default_factory=threading.Event)
 

@@ -2,20 +2,18 @@
 
 Each process belongs to a player, a thread that waits for it. A player takes some episodes of a
 request, lets its process play them for some milliseconds, and returns those that were not reached.
-The requests of all clients take turns. After a second without work, a player returns its process to
-the pool.
+The oldest request comes first. After a second without work, a player returns its process to the
+pool.
 """
 
 from __future__ import annotations
 
-import itertools
-import json
 import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from gym_server import memory
@@ -23,7 +21,6 @@ from gym_server.errors import GymServerError, lacks_memory, shutting_down, too_m
 from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
-from gym_server.protocol import safetensors
 from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.task import Task, Unit
 from gym_server.rollouts.tensors import concatenated
@@ -32,10 +29,6 @@ log = logging.getLogger(__name__)
 
 # Requests that wait or are being played. Each has a thread, and a body of up to 16 MiB.
 _MOST_REQUESTS = 64
-
-# A request's turn lasts this many seconds. R's requests take less: while one is played, the
-# response to the previous one and the next request are on their way.
-_TURN_SECONDS = 0.3
 
 # After this many seconds without work, a process is returned to the pool.
 _IDLE_SECONDS = 1.0
@@ -48,15 +41,7 @@ _UNWANTED_SECONDS = 2.0
 # An episode is not played again after this many deaths of its process.
 _MOST_DEATHS = 3
 
-# How many tasks a process remembers. It forgets them in the same order; see ``rollouts.worker``.
-_MOST_KNOWN = 8
-
-_PARTS_OF_ERRORS = ("code", "message", "hint", "extra")
-
 _WORKER = "gym_server.rollouts.worker"
-
-# Identifies tasks to processes, which several servers in this process may use in turn.
-_numbers = itertools.count(1)
 
 
 @dataclass(eq=False)
@@ -67,13 +52,13 @@ class _Player:
         process: the process; None until it is started.
         request: what it is playing, or None.
         units: the units that it is playing.
-        known: the numbers of the requests whose task the process has, the latest last.
+        last: the request whose task the process has, or None.
     """
 
     process: WorkerProcess | None = None
     request: RolloutRequest | None = None
     units: range = range(0)
-    known: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_KNOWN))
+    last: RolloutRequest | None = None
 
 
 class Rollouts:
@@ -146,7 +131,7 @@ class Rollouts:
         return concatenated(results), error
 
     def _request(self, task: Task, function: str, units: Sequence[Unit]) -> RolloutRequest:
-        request = RolloutRequest(next(_numbers), task, function, units)
+        request = RolloutRequest(task, function, units)
         request.waiting.append(range(len(units)))
         with self._changed:
             if self._last_played is not None and self._last_played[0] == task.env_key:
@@ -233,27 +218,16 @@ class Rollouts:
         due = time.monotonic() + _IDLE_SECONDS
         with self._changed:
             while not self._stopping:
-                for request in list(self._requests):
+                for request in self._requests:
                     units = request.take(len(self._players))
                     if units is not None:
                         player.request, player.units = request, units
-                        self._end_turn(request)
                         return True
                 left = due - time.monotonic()
                 if left <= 0:
                     return False
                 self._changed.wait(left)
         return False
-
-    def _end_turn(self, request: RolloutRequest) -> None:
-        """Move a request to the end of the queue when its turn is over."""
-        now = time.monotonic()
-        if request.turn_ends is None:
-            request.turn_ends = now + _TURN_SECONDS
-        elif now > request.turn_ends:
-            request.turn_ends = None
-            self._requests.remove(request)
-            self._requests.append(request)
 
     def _play(self, player: _Player) -> None:
         """Let the process play some units, and store the results."""
@@ -296,7 +270,7 @@ class Rollouts:
         if process is None:
             process = pool.take(_WORKER, low_priority=True)
             process.report_end(lambda why: None)
-            player.known.clear()
+            player.last = None
         process.progress[1] = 0
         with self._changed:
             player.process = process
@@ -304,14 +278,12 @@ class Rollouts:
             if self._stopping:
                 raise shutting_down()
         if request.function == "describe":
-            process.begin("describe", request.task)
-            return 1, process.finish(), None
-        task = None if request.number in player.known else request.task
-        process.begin("play", request.number, task, [request.units[unit] for unit in units])
-        body = process.finish()
-        if task is not None:
-            player.known.append(request.number)
-        return _read(body)
+            return 1, process.call("describe", request.task), None
+        task = None if request is player.last else request.task
+        player.last = None
+        done, tensors, error = process.call("play", task, [request.units[unit] for unit in units])
+        player.last = request
+        return done, tensors, error
 
     def _enter_error(
         self, player: _Player, request: RolloutRequest, units: range, error: GymServerError
@@ -356,14 +328,3 @@ class Rollouts:
                 if player.process is not None and player.request is not None:
                     player.process.kill()
             self._changed.notify_all()
-
-
-def _read(body: bytes) -> tuple[int, dict[str, Tensor], GymServerError | None]:
-    """Read what a process played; see ``worker.play()``."""
-    tensors, metadata = safetensors.read(body)
-    error = None
-    if "error" in metadata:
-        told = json.loads(metadata["error"])
-        error = GymServerError(*[told.get(name) for name in _PARTS_OF_ERRORS])
-        error.is_logged = True
-    return int(metadata["done"]), tensors, error

@@ -14,9 +14,14 @@ from gym_server.memory import CGROUP
 def usable_cores(cgroup: Path = CGROUP) -> int:
     """Return how many cores this process may use: its affinity, capped by its cgroup's limit.
 
+    The variable PYTHON_CPU_COUNT, which Python itself knows from 3.13 on, says another number.
+
     Args:
-        cgroup: the mount point of control groups, version 1 or 2.
+        cgroup: the mount point of control groups of version 2.
     """
+    told = os.environ.get("PYTHON_CPU_COUNT", "")
+    if told.isdecimal() and int(told) > 0:
+        return int(told)
     if hasattr(os, "sched_getaffinity"):
         cores = len(os.sched_getaffinity(0))
     else:
@@ -26,14 +31,12 @@ def usable_cores(cgroup: Path = CGROUP) -> int:
 
 def _cgroup_limit(cgroup: Path) -> float:
     """Return the limit in cores; infinity if there is none."""
-    with contextlib.suppress(OSError, ValueError, IndexError):
+    try:
         quota, period = (cgroup / "cpu.max").read_text().split()
-        return float(quota) / float(period) if quota != "max" else math.inf
-    with contextlib.suppress(OSError, ValueError, IndexError):
-        quota = (cgroup / "cpu" / "cpu.cfs_quota_us").read_text()
-        period = (cgroup / "cpu" / "cpu.cfs_period_us").read_text()
-        return float(quota) / float(period) if float(quota) > 0 else math.inf
-    return math.inf
+        return float(quota) / float(period)
+    except (OSError, ValueError):
+        # There is no group, or its quota is "max".
+        return math.inf
 
 
 def spread(pids: Sequence[int]) -> None:

@@ -11,21 +11,9 @@ from gym_server.errors import GymServerError, environment_error
 from gym_server.processes.pipe import Pipe
 
 
-def read_call(raw: bytes) -> tuple[str, tuple]:
-    """Return the name of a call's function, and its arguments."""
-    name, args = pickle.loads(raw)
-    return name, args
-
-
-def result_message(result: object) -> bytes:
-    """Return the message for a result."""
-    return pickle.dumps((result, None), 5)
-
-
-def refusal_message(refusal: dict[str, str]) -> bytes:
-    """Return the message for an error; see ``errors.answer_to()``."""
-    parts = tuple(refusal.get(name) for name in ("code", "message", "hint", "extra"))
-    return pickle.dumps((None, parts), 5)
+def result_message(result: object, error: GymServerError | None = None) -> bytes:
+    """Return the message for a result, or for the error instead of it."""
+    return pickle.dumps((result, error), 5)
 
 
 class CallPipe:
@@ -47,9 +35,16 @@ class CallPipe:
             GymServerError: ``malformed_json``.
             EOFError, OSError: the process has ended.
         """
+        try:
+            message = pickle.dumps((method, args), 5)
+        except RecursionError:
+            # The JSON reader allows deeper nesting than pickle.
+            raise GymServerError(
+                "malformed_json", "The lists in the request's body are nested too deeply"
+            ) from None
         self._lock.acquire()
         try:
-            self._pipe.send(_pickled(method, args))
+            self._pipe.send(message)
         except BaseException:
             self._lock.release()
             raise
@@ -66,12 +61,10 @@ class CallPipe:
         finally:
             self._lock.release()
         try:
-            result, refusal = pickle.loads(raw)
+            result, error = pickle.loads(raw)
         except Exception as fault:
             raise environment_error(fault, "Reading what the environment returned") from fault
-        if refusal is not None:
-            error = GymServerError(*refusal)
-            error.is_logged = True
+        if error is not None:
             raise error
         return result
 
@@ -83,14 +76,3 @@ class CallPipe:
         """Close the pipe when no call is waiting any more; ``wake()`` ends one that is."""
         with self._lock:
             self._pipe.close()
-
-
-def _pickled(method: str, args: tuple) -> bytes:
-    try:
-        return pickle.dumps((method, args), 5)
-    except RecursionError:
-        # The JSON reader allows deeper nesting than pickle.
-        raise GymServerError(
-            "malformed_json",
-            "The lists in the request's body are nested too deeply",
-        ) from None

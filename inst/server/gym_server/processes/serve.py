@@ -6,6 +6,7 @@ import contextlib
 import faulthandler
 import importlib
 import os
+import pickle
 import signal
 from collections.abc import Callable
 from functools import cache
@@ -13,30 +14,29 @@ from multiprocessing.connection import Connection
 from typing import Any, cast
 
 from gym_server import logs
-from gym_server.errors import GymServerError, answer_to, environment_error
+from gym_server.errors import GymServerError, environment_error, logged
 from gym_server.processes import start
-from gym_server.processes.messages import read_call, refusal_message, result_message
+from gym_server.processes.messages import result_message
 from gym_server.processes.pipe import Pipe
 
 # The progress of the running function, visible to the server; see ``WorkerProcess``.
 progress: Any = [0, 0]
 
 
-def serve(calls: Connection, log_level: int, shared_progress: Any) -> None:
+def serve(calls: Connection, shared_progress: Any) -> None:
     """Call functions, one after another, until the server closes the pipe or ends.
 
     Args:
         calls: receives one call after another.
-        log_level: the lowest level to log to standard error.
         shared_progress: two integers that the server can read.
     """
     global progress
-    _set_up(log_level)
+    _set_up()
     progress = memoryview(shared_progress).cast("B").cast("q")
     pipe = Pipe(calls)
     while True:
         try:
-            name, args = read_call(pipe.receive())
+            name, args = pickle.loads(pipe.receive())
         except (EOFError, OSError):
             return
         message = _answer(name, args)
@@ -46,12 +46,8 @@ def serve(calls: Connection, log_level: int, shared_progress: Any) -> None:
             os._exit(1)
 
 
-def _set_up(log_level: int) -> None:
-    """Make this process end with the server and log as the server does.
-
-    Args:
-        log_level: the lowest level to log to standard error.
-    """
+def _set_up() -> None:
+    """Make this process end with the server and log as the server does."""
     if hasattr(os, "setsid"):
         # So that processes which the environment starts can be killed with it, and Ctrl-C reaches
         # only the server.
@@ -60,7 +56,7 @@ def _set_up(log_level: int) -> None:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     start.exit_with_parent(group=True)
-    logs.set_up(log_level, " (process %(process)d)")
+    logs.set_up(" (process %(process)d)")
     with contextlib.suppress(OSError, ValueError, AttributeError):
         # Print where C code crashed.
         faulthandler.enable()
@@ -70,9 +66,9 @@ def _answer(name: str, args: tuple) -> bytes:
     try:
         return result_message(_function(name)(*args))
     except GymServerError as refusal:
-        return refusal_message(answer_to(refusal)[1])
+        return result_message(None, logged(refusal))
     except BaseException as failure:
-        return refusal_message(answer_to(environment_error(failure))[1])
+        return result_message(None, logged(environment_error(failure)))
 
 
 @cache

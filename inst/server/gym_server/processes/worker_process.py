@@ -87,7 +87,7 @@ class WorkerProcess:
         # Not a daemon: daemons may not start processes, and sub-environments can be processes.
         self._process = context.Process(
             target=serve,
-            args=(theirs, logging.getLogger().level, self.progress),
+            args=(theirs, self.progress),
             daemon=False,
         )
         try:

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from gym_server.envs.make import call_env
-from gym_server.errors import GymServerError, answer_to, environment_error
+from gym_server.errors import GymServerError, environment_error, logged
 from gym_server.policies import read_policy
 from gym_server.processes import serve, start
-from gym_server.protocol.answers import dumps
-from gym_server.protocol.safetensors import Tensor, write
+from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.environment import RolloutEnv
 from gym_server.rollouts.episode import Played, play_episode
 from gym_server.rollouts.group import play_group
@@ -28,12 +27,13 @@ start.preload(__name__)
 # How long to play before returning the results, so that others get their turn.
 _SECONDS = 0.015
 
-# How many environments and tasks to keep; enough for two clients at a time.
+# How many environments to keep; enough for two clients at a time.
 _MOST_ENVIRONMENTS = 4
-_MOST_TASKS = 8
 
 _environments: OrderedDict[str, RolloutEnv] = OrderedDict()
-_tasks: OrderedDict[int, _Playing] = OrderedDict()
+
+# The last task, ready to play.
+_playing: _Playing
 
 
 def describe(task: Task) -> dict:
@@ -41,30 +41,27 @@ def describe(task: Task) -> dict:
     return _environment(task).describe()
 
 
-def play(number: int, task: Task | None, units: Sequence[Unit]) -> bytes:
+def play(
+    task: Task | None, units: Sequence[Unit]
+) -> tuple[int, dict[str, Tensor], GymServerError | None]:
     """Play for some milliseconds.
 
     Args:
-        number: the number of the task.
-        task: the task, if this process does not have it; else None.
+        task: the task; None for the same as the last time.
         units: the units to play, in this order.
 
     Returns:
-        A safetensors file with the results of the first units. Its metadata has their number
-        (``done``), and the error of the next unit, if it failed (``error``).
+        The number of the first units, which were played; their results; and the error of the next
+        unit, if it failed.
 
     Raises:
         GymServerError: the environment cannot be made, or the policy does not fit.
     """
-    playing = _tasks.get(number)
-    if playing is None:
-        if task is None:
-            raise GymServerError("internal_error", "This process does not have the task")
-        playing = _tasks[number] = _Playing(task)
-        while len(_tasks) > _MOST_TASKS:
-            _tasks.popitem(last=False)
-    _tasks.move_to_end(number)
-    return playing.play(units)
+    global _playing
+    if task is not None:
+        _playing = _Playing(task)
+    done, tensors, error = _playing.play(units)
+    return done, tensors, error and logged(error)
 
 
 def _environment(task: Task) -> RolloutEnv:
@@ -106,15 +103,11 @@ class _Playing:
     def _env(self) -> RolloutEnv:
         return _environment(self._task)
 
-    def play(self, units: Sequence[Unit]) -> bytes:
+    def play(self, units: Sequence[Unit]) -> tuple:
         self._check_rows(units[0])
         due = time.monotonic() + _SECONDS
         play = self._play_episodes if self._env.group is None else self._play_groups
-        done, tensors, error = play(units, due)
-        metadata = {"done": str(done)}
-        if error is not None:
-            metadata["error"] = dumps(answer_to(error)[1]).decode("ascii")
-        return write(tensors, metadata)
+        return play(units, due)
 
     def _check_rows(self, unit: Unit) -> None:
         group, env_id = self._env.group, self._task.config.env_id

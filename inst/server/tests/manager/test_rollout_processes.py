@@ -49,7 +49,7 @@ def ask_and_leave(server, seconds, seeds, **how):
 
 def test_an_episode_that_hangs_is_ended_and_named(quick, gate, eventually):
     # Without a limit, because starting a process takes long on a busy machine.
-    app = quick(max_call_seconds=0, max_rollout_processes=1)
+    app = quick(max_call_seconds=0, max_processes=1)
     how = {"env_id": "faulty_envs:Gated-v0", "kwargs": gate.kwargs, "max_steps": 5}
     answer = in_background(lambda: refused(app.test_client(), [4, 5], **how))
     eventually(gate.is_reached)
@@ -63,7 +63,7 @@ def test_an_episode_that_hangs_is_ended_and_named(quick, gate, eventually):
 
 
 def test_steps_that_go_on_are_no_hang(quick, eventually):
-    app = quick(max_call_seconds=0, max_rollout_processes=1)
+    app = quick(max_call_seconds=0, max_processes=1)
     rollouts = app._rollouts
     how = {"env_id": "faulty_envs:Counting-v0", "kwargs": {"seconds": 0.05, "length": 30}}
     answer = in_background(lambda: roll_out(app.test_client(), [1], max_steps=30, **how))
@@ -96,8 +96,9 @@ def pids_of(rollouts):
     return [one.process.pid for one in list(rollouts._players) if one.process is not None]
 
 
-def test_a_process_that_is_killed_changes_no_result(quick, eventually):
-    app = quick(max_rollout_processes=2)
+def test_a_process_that_is_killed_changes_no_result(quick, eventually, monkeypatch):
+    monkeypatch.setenv("PYTHON_CPU_COUNT", "2")
+    app = quick()
     client = app.test_client()
     how = {"env_id": "LunarLander-v3", "max_steps": 200}
     expected, _ = roll_out(client, range(100), **how)
@@ -117,7 +118,7 @@ def test_a_process_that_is_killed_changes_no_result(quick, eventually):
 
 def test_a_queue_that_is_full_asks_to_come_again(quick, tmp_path, eventually, monkeypatch):
     monkeypatch.setattr("gym_server.manager.rollouts._MOST_REQUESTS", 1)
-    app = quick(max_rollout_processes=1)
+    app = quick(max_processes=1)
     how = {"env_id": "faulty_envs:Gated-v0", "kwargs": {"directory": str(tmp_path)}}
     first = in_background(lambda: roll_out(app.test_client(), [1], max_steps=2, **how))
     eventually((tmp_path / "begun").exists)
@@ -131,23 +132,8 @@ def test_a_queue_that_is_full_asks_to_come_again(quick, tmp_path, eventually, mo
     assert first()[0]["length"].tolist() == [2]
 
 
-def test_a_long_request_does_not_keep_others_waiting(quick):
-    app = quick(max_rollout_processes=1)
-    # Now it is started, and its speed is known.
-    roll_out(app.test_client(), [1], env_id="LunarLander-v3")
-    over = []
-    long = in_background(
-        lambda: [roll_out(app.test_client(), range(500), env_id="LunarLander-v3"), over.append(1)]
-    )
-    while not app._rollouts._requests:
-        time.sleep(0.001)
-    roll_out(app.test_client(), [1, 2, 3], **LAKE)
-    assert not over
-    long()
-
-
 def test_episodes_of_a_client_that_leaves_are_not_played(serve):
-    server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs")
+    server = serve("--max-processes", "1", "--allow-module", "faulty_envs")
     ask_and_leave(server, 0.5, range(100_000), env_id="LunarLander-v3")
     began = time.monotonic()
     assert len(asked(server, [1, 2], **LAKE)["return"]) == 2
@@ -157,7 +143,7 @@ def test_episodes_of_a_client_that_leaves_are_not_played(serve):
 
 def test_a_step_that_nobody_waits_for_is_ended(serve):
     limits = {"gym_server.manager.rollouts._UNWANTED_SECONDS": 0.1}
-    server = serve("--max-rollout-processes", "1", "--allow-module", "faulty_envs", limits=limits)
+    server = serve("--max-processes", "1", "--allow-module", "faulty_envs", limits=limits)
     ask_and_leave(server, 1, [1], env_id="faulty_envs:Hanging-v0", max_steps=3)
     assert len(asked(server, [1], **LAKE)["return"]) == 1
 
@@ -171,7 +157,7 @@ def test_a_process_that_loses_its_pipe_has_died(quick):
 
 def test_processes_are_used_again_by_the_next_rollout(quick, monkeypatch, eventually):
     monkeypatch.setattr("gym_server.manager.rollouts._IDLE_SECONDS", 0.05)
-    app = quick(max_rollout_processes=1)
+    app = quick(max_processes=1)
     roll_out(app.test_client(), [1], **LAKE)
     pids = pids_of(app._rollouts)
     eventually(lambda: not pids_of(app._rollouts))

@@ -31,11 +31,9 @@ def test_a_cgroup_limits_the_cores(eight, tmp_path, text, cores):
     assert usable_cores(tmp_path) == cores
 
 
-@pytest.mark.parametrize(("quota", "cores"), [("-1", 8), ("300000", 3)])
-def test_so_does_an_old_one(eight, tmp_path, quota, cores):
-    (tmp_path / "cpu").mkdir()
-    (tmp_path / "cpu" / "cpu.cfs_quota_us").write_text(quota)
-    (tmp_path / "cpu" / "cpu.cfs_period_us").write_text("100000")
+@pytest.mark.parametrize(("told", "cores"), [("3", 3), ("default", 8), ("0", 8)])
+def test_a_variable_says_how_many_cores_to_use(eight, tmp_path, monkeypatch, told, cores):
+    monkeypatch.setenv("PYTHON_CPU_COUNT", told)
     assert usable_cores(tmp_path) == cores
 
 

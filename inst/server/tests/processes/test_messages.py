@@ -1,13 +1,14 @@
 """Calls to a process, and their results."""
 
 import multiprocessing
+import pickle
 import threading
 
 import numpy as np
 import pytest
 
 from gym_server.errors import GymServerError
-from gym_server.processes.messages import CallPipe, read_call, refusal_message, result_message
+from gym_server.processes.messages import CallPipe, result_message
 from gym_server.processes.pipe import ConnectionPipe, Pipe
 
 
@@ -36,17 +37,18 @@ def test_calls_and_results_arrive_as_they_were(ends):
         sender.start()
         answer = call(pipe, "step", [1], {"b": 2})
         sender.join()
-        assert read_call(other.receive()) == ("step", ([1], {"b": 2}))
+        assert pickle.loads(other.receive()) == ("step", ([1], {"b": 2}))
         np.testing.assert_equal(answer, result)
 
 
 def test_a_refusal_is_raised_with_all_its_words(ends):
     pipe, other = ends
-    other.send(refusal_message({"code": "reset_needed", "message": "m", "hint": "h"}))
+    other.send(result_message(None, GymServerError("reset_needed", "m", "h", "extra")))
     with pytest.raises(GymServerError) as caught:
         call(pipe, "step")
     error = caught.value
     assert (error.code, error.message, error.hint) == ("reset_needed", "m", "h")
+    assert error.extra == "extra" and error.is_logged
 
 
 def test_a_result_is_read_after_the_process_has_ended():
