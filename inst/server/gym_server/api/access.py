@@ -22,10 +22,6 @@ _AUTHORITY = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+?)\.?(?::([0-9]*))?
 _ORIGIN = re.compile("(https?)://(.*)")
 _DEFAULT_PORTS = {"http": "80", "https": "443"}
 
-# How many allowed values of Host are remembered, so that a client that sends many different ones
-# takes no memory. Others are checked each time.
-_MOST_KNOWN = 100
-
 
 @dataclass(frozen=True)
 class Access:
@@ -52,13 +48,11 @@ class Guard:
             access: which requests to accept.
             watch_keys: the keys that open a watch page without the token.
         """
-        token = access.token
-        self._expected = None if token is None else f"Bearer {token}".encode("latin-1")
+        self._token = None if access.token is None else access.token.encode("latin-1")
         self._watch_keys = watch_keys
         self._names = {"localhost", access.host.lower()}
         self._origins = {split_host(name) for name in access.allowed_hosts}
         self._names |= {name for name, _ in self._origins}
-        self._known_hosts: set[str] = set()
         self._listens_on_loopback = is_loopback(access.host)
         self._machine_names: set[str] | None = None
 
@@ -73,8 +67,7 @@ class Guard:
             GymServerError: ``malformed_json`` (no Host, or several), ``foreign_host``,
                 ``foreign_origin``, ``unauthorized``.
         """
-        if environ.get("HTTP_HOST") not in self._known_hosts:
-            self._check_host(environ)
+        self._check_host(environ)
         if "HTTP_ORIGIN" in environ or "HTTP_SEC_FETCH_SITE" in environ:
             self._check_page(environ)
         if not self.has_token(environ):
@@ -99,8 +92,6 @@ class Guard:
                 f"This server does not answer to the name {brief(host)}",
                 "use its address, or start it with --allow-host NAME",
             )
-        if len(self._known_hosts) < _MOST_KNOWN:
-            self._known_hosts.add(host)
 
     def _is_ours(self, name: str) -> bool:
         if name in self._names:
@@ -138,16 +129,12 @@ class Guard:
 
     def has_token(self, environ: dict) -> bool:
         """Return whether a request has the token, if there is one."""
-        if self._expected is None:
-            return True
-        given = environ.get("HTTP_AUTHORIZATION", "").encode("latin-1", "replace")
-        if hmac.compare_digest(given, self._expected):
+        if self._token is None:
             return True
         # The name of the scheme is not case-sensitive.
-        scheme, _, token = given.partition(b" ")
-        return scheme.lower() == b"bearer" and hmac.compare_digest(
-            b"Bearer " + token.strip(), self._expected
-        )
+        scheme, _, token = environ.get("HTTP_AUTHORIZATION", "").partition(" ")
+        given = token.strip().encode("latin-1", "replace")
+        return scheme.lower() == "bearer" and hmac.compare_digest(given, self._token)
 
     def _check_callers(self, environ: dict, match: Match | None) -> None:
         """Accept a request without the token if its route allows that."""

@@ -1,27 +1,24 @@
 """The Flask application: creates the services, checks requests, and passes them to their routes.
 
-Flask maps URLs to routes, answers requests without a route, and provides the test client. Its own
-dispatch takes longer than many steps, so requests with a route bypass it.
+Flask maps URLs to routes, and provides the test client. Its own dispatch takes longer than many
+steps, so requests bypass it.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import flask
 from flask import Flask
 
+from gym_server.api import env_routes, rollout_routes, server_routes, stream_routes, watch_routes
 from gym_server.api.access import Access, Guard
 from gym_server.api.calls import Services
 from gym_server.api.endpoint import Endpoint
 from gym_server.api.exactly_once import ExactlyOnce
-from gym_server.api.failures import failure
 from gym_server.api.open_streams import OpenStreams
-from gym_server.api.routes import BLUEPRINTS
 from gym_server.api.routing import Callers, Match, Router
 from gym_server.api.watch_keys import WatchKeys
 from gym_server.errors import GymServerError, body_too_large, malformed_request
@@ -30,8 +27,17 @@ from gym_server.manager.limits import Limits
 from gym_server.manager.rollouts import Rollouts
 from gym_server.manager.watchdog import Watchdog
 from gym_server.monitoring.monitor_directory import MonitorRoot
+from gym_server.protocol.answers import failure
 from gym_server.rendering.render_thread import RenderThread
 from gym_server.response import Admission, Response
+
+BLUEPRINTS = (
+    env_routes.bp,
+    rollout_routes.bp,
+    server_routes.bp,
+    stream_routes.bp,
+    watch_routes.bp,
+)
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,6 @@ class GymApp(Flask):
             OpenStreams(self._exactly_once, config.max_body_bytes),
             watch_keys if config.access.token is not None else None,
         )
-        self.register_error_handler(Exception, lambda error: _for_flask(failure(error)))
         self._watchdog = Watchdog(
             self._instances,
             self._rollouts,
@@ -104,24 +109,18 @@ class GymApp(Flask):
         Args:
             environ: the request's head, as a WSGI environ.
         """
-        match = self._router.match(environ)
+        found = self._router.match(environ)
+        match = found if isinstance(found, Match) else None
         try:
             self._guard.check(environ, match)
         except GymServerError as refusal:
             return _refused(refusal, environ, match)
-        if match is None:
-            return Admission(partial(self._without_route, environ))
-        endpoint = Endpoint(environ, match, self._services, self._exactly_once)
+        if isinstance(found, Response):
+            return Admission(lambda *_: found)
+        endpoint = Endpoint(environ, found, self._services, self._exactly_once)
         has_token = self._guard.has_token(environ)
-        is_known = has_token or match.callers is Callers.WATCHERS
+        is_known = has_token or found.callers is Callers.WATCHERS
         return Admission(endpoint.respond, is_known, lasts=has_token)
-
-    def _without_route(self, environ: dict, body: bytes, _: Callable[[], bool]) -> Response:
-        """Answer 404, 405, or a redirect if the path has too many slashes."""
-        with self.request_context({**environ, "wsgi.input": io.BytesIO(body)}):
-            found = self.full_dispatch_request()
-        others = [(name, value) for name, value in found.headers if not name.startswith("Content-")]
-        return Response(found.status_code, found.data, found.content_type or "", tuple(others))
 
     def wsgi_app(self, environ: dict, start_response: Callable) -> Iterable[bytes]:
         """Answer a request by WSGI, for Flask's test client."""
@@ -131,7 +130,9 @@ class GymApp(Flask):
             answer = self.refuse(413, "")
         if isinstance(answer, Admission):
             answer = answer.respond(environ["wsgi.input"].read(length), lambda: True)
-        return _for_flask(answer)(environ, start_response)
+        made = flask.Response(answer.body, answer.status, content_type=answer.content_type)
+        made.headers.extend(answer.headers)
+        return made(environ, start_response)
 
     def refuse(self, status: int, reason: str) -> Response:
         """Return the response to a request that does not reach the application.
@@ -173,9 +174,3 @@ def _refused(refusal: GymServerError, environ: dict, match: Match | None) -> Res
         page = match.route.refusal_page(match.path, refusal.status)
         return page._replace(headers=(*page.headers, *refusal.headers))
     return failure(refusal)
-
-
-def _for_flask(response: Response) -> flask.Response:
-    made = flask.Response(response.body, response.status, content_type=response.content_type)
-    made.headers.extend(response.headers)
-    return made

@@ -11,11 +11,10 @@ from werkzeug.wrappers import Request
 
 from gym_server.api.calls import Call, Services
 from gym_server.api.exactly_once import ExactlyOnce, kept_body
-from gym_server.api.failures import failure
 from gym_server.api.routing import Match
 from gym_server.errors import GymServerError
 from gym_server.protocol import bodies
-from gym_server.protocol.answers import JSON_FORM, AnswerForm, response_to
+from gym_server.protocol.answers import JSON_FORM, AnswerForm, failure, response_to
 from gym_server.protocol.fields import REQUEST, RequestId, read
 from gym_server.protocol.safetensors import COLUMN_TENSORS, TENSORS
 from gym_server.response import Response
@@ -42,12 +41,13 @@ class Endpoint:
         self._exactly_once = exactly_once
         # Read the idempotency key first, because errors in other fields echo it.
         self._fields = (REQUEST, *route.fields) if route.once else route.fields
-        self._is_tensors = route.tensor_body is not None and TENSORS in environ["CONTENT_TYPE"]
+        self._is_tensors = route.tensor_body and TENSORS in environ["CONTENT_TYPE"]
         self._read: Callable[[bytes], dict] = bodies.loads
         if route.method == "GET":
             self._read = partial(_query, environ)
-        elif self._is_tensors and route.tensor_body is not None:
-            self._read = route.tensor_body
+        elif self._is_tensors:
+            names = frozenset(field.name for field in self._fields)
+            self._read = partial(bodies.loads_tensors, names=names)
         self._accept = environ.get("HTTP_ACCEPT", "")
         self._form = JSON_FORM
         if route.tensors:

@@ -10,21 +10,18 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from gym_server.envs.config import Wrapper
-from gym_server.errors import invalid_parameter
 from gym_server.protocol.fields import BOOLEAN, Field, Kind, boolean, integer, json_object, text
 
 # Text that is visible on one line, and does not change the text direction of other lines.
-_NAME = "^[^\\u0000-\\u001f\\u007f-\\u009f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff]*$"
-_LONGEST_NAME = 100
+_NAME = re.compile(
+    "[^\\0-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ufeff\\ud800-\\udfff]{,100}"
+)
 
 
 def _name(value: object) -> str:
-    value = text(value)
-    # Refuse half a surrogate pair, which many regular expression engines cannot exclude.
-    value.encode()
-    if len(value) > _LONGEST_NAME or re.fullmatch(_NAME, value) is None:
+    if _NAME.fullmatch(text(value)) is None:
         raise ValueError
-    return value
+    return text(value)
 
 
 def _wrappers(value: object) -> tuple[Wrapper, ...]:
@@ -53,31 +50,15 @@ def _positive(value: object) -> int:
 
 
 def _seed(value: object) -> object:
-    return _seeds(
-        value,
-        _own_seed,
-        "an integer, 0 or greater, or a list of one, or null, for each sub-environment",
-    )
+    return tuple(map(_own_seed, value)) if isinstance(value, list) else _one_seed(value)
 
 
 def _reset_seed(value: object) -> object:
-    if not isinstance(value, list) or not any(isinstance(item, list) for item in value):
-        return _seed(value)
-    return _seeds(
-        value,
-        lambda item: _later_seeds(item) if isinstance(item, list) else _own_seed(item),
-        "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
-        "sub-environment",
-    )
-
-
-def _seeds(value: object, parse: Callable[[object], object], wanted: str) -> object:
     if not isinstance(value, list):
         return _one_seed(value)
-    try:
-        return tuple(map(parse, value))
-    except ValueError:
-        raise invalid_parameter("seed", value, wanted) from None
+    return tuple(
+        _later_seeds(item) if isinstance(item, list) else _own_seed(item) for item in value
+    )
 
 
 def _own_seed(value: object) -> int | None:
@@ -133,12 +114,16 @@ def _named(names: Mapping[str, Any]) -> Kind:
 
 
 ANY_ID = Kind("a string", lambda value: value)
-NAME = Kind(f"a text of 1 to {_LONGEST_NAME} printable characters", _name)
+NAME = Kind("a text of 1 to 100 printable characters", _name)
 WRAPPERS = Kind('a list of objects of a "name" and "kwargs"', _wrappers)
 VIDEO_CALLABLE = Kind("true, false or an integer n for every n-th episode", _video_callable)
 POSITIVE = Kind("an integer, 1 or greater", _positive)
-SEED = Kind("an integer, 0 or greater", _seed)
-RESET_SEED = Kind("an integer, 0 or greater", _reset_seed)
+SEED = Kind("an integer, 0 or greater, or a list of one, or null, for each sub-environment", _seed)
+RESET_SEED = Kind(
+    "an integer, 0 or greater, or a list of one, null, or a list of one or more, for each "
+    "sub-environment",
+    _reset_seed,
+)
 NUM_WORKERS = Kind("an integer, 0 or greater", integer)
 MASK = Kind("a list of true or false for each sub-environment", _mask, empty_is_absent=False)
 QUERY_INTEGER = Kind("an integer, 0 or greater", _query_integer)

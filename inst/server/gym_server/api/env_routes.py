@@ -1,4 +1,4 @@
-"""The routes of environments: create, reset, step, draw and close them."""
+"""The routes of environments: create, reset, step, draw, record and close them; their spaces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.instances.about import about
 from gym_server.protocol.answers import tensor_response
-from gym_server.protocol.bodies import parse_tensors
+from gym_server.protocol.bodies import parse_path_value
 from gym_server.protocol.fields import ANYTHING, BOOLEAN, OBJECT, TEXT, Field
 from gym_server.rendering.png import png
 from gym_server.response import Response
@@ -84,7 +84,7 @@ def env_reset(call: Call) -> dict:
     env_fields.FINAL_OBS,
     once=True,
     tensors=True,
-    tensor_body=parse_tensors,
+    tensor_body=True,
 )
 def env_step(call: Call) -> dict:
     """Take one step."""
@@ -125,3 +125,63 @@ def env_close(call: Call) -> None:
 def env_delete(call: Call) -> None:
     """Close an environment, like the route close/."""
     env_close(call)
+
+
+# Spaces --------------------------------------------------------------------------------------
+
+
+_SPACE = INSTANCE + "<any(action_space, observation_space):space>/"
+
+
+@bp.declare("GET", _SPACE)
+def env_space_info(call: Call) -> dict:
+    """Describe a space."""
+    return {"info": call.instance.space_info(call.path["space"])}
+
+
+@bp.declare("GET", INSTANCE + "action_space/sample/")
+def env_action_space_sample(call: Call) -> dict:
+    """Sample an action."""
+    return {"action": call.instance.sample_action()}
+
+
+@bp.declare("GET", INSTANCE + "action_space/contains/<x>/")
+def env_action_space_contains(call: Call) -> dict:
+    """Check whether a value is an action."""
+    value = parse_path_value(call.path["x"])
+    return {"member": call.instance.contains("action_space", {"value": value})}
+
+
+@bp.declare("POST", _SPACE + "contains/", Field("value", ANYTHING))
+def env_space_contains(call: Call) -> dict:
+    """Check whether a value is a member of a space, or a description matches the space."""
+    return {"member": call.instance.contains(call.path["space"], call.body)}
+
+
+# Monitors, which record episodes -------------------------------------------------------------
+
+
+@bp.declare(
+    "POST",
+    INSTANCE + "monitor/start/",
+    Field("directory", TEXT, required=True),
+    Field("force", BOOLEAN),
+    Field("resume", BOOLEAN),
+    Field("video_callable", env_fields.VIDEO_CALLABLE),
+)
+def env_monitor_start(call: Call) -> None:
+    """Record the episodes that start from now on."""
+    fields = call.fields
+    call.instance.start_monitor(
+        call.services.monitor_root,
+        fields["directory"],
+        bool(fields["force"]),
+        bool(fields["resume"]),
+        fields["video_callable"] or 0,
+    )
+
+
+@bp.declare("POST", INSTANCE + "monitor/close/")
+def env_monitor_close(call: Call) -> None:
+    """Finish the monitor's files; without a monitor, do nothing."""
+    call.instance.close_monitor()

@@ -14,7 +14,6 @@ from gym_server.api.routing import RouteBlueprint
 from gym_server.envs.config import EnvConfig
 from gym_server.errors import GymServerError, answer_to, invalid_parameter
 from gym_server.protocol.answers import dumps, tensor_response
-from gym_server.protocol.bodies import loads_file
 from gym_server.protocol.fields import OBJECT, Field, Kind
 from gym_server.protocol.safetensors import Tensor
 from gym_server.response import Response
@@ -45,7 +44,7 @@ _KEEP = Kind(f"a list of some of {', '.join(_KEPT)}", _keep)
     Field("max_steps", env_fields.POSITIVE),
     Field("keep", _KEEP),
     tensors=True,
-    tensor_body=loads_file,
+    tensor_body=True,
 )
 def rollouts(call: Call) -> dict | Response:
     """Play whole episodes with a policy that is sent as data."""

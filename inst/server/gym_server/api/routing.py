@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 from flask import Blueprint, Flask
 from werkzeug.exceptions import HTTPException
 
+from gym_server.protocol.answers import failure
 from gym_server.protocol.fields import Field
 from gym_server.response import JSON, Response
 
@@ -17,7 +19,6 @@ INSTANCE = "/v1/envs/<instance_id>/"
 
 # The characters of an instance_id.
 _HEX_DIGITS = frozenset("0123456789abcdef")
-
 Handler = Callable[..., dict | Response | None]
 
 
@@ -45,7 +46,7 @@ class Route:
         ends_instance: whether it closes the instance in the path.
         content_type: the content type of an ordinary response.
         tensors: whether the response may be tensors, if the client accepts them.
-        tensor_body: reads a body of tensors; None if it may not be tensors.
+        tensor_body: whether the body may be tensors.
         refusal_page: makes a page, from a path and a status, that people who may not call the route
             get instead of an error in JSON; None for no page.
     """
@@ -59,7 +60,7 @@ class Route:
     ends_instance: bool = False
     content_type: str = JSON
     tensors: bool = False
-    tensor_body: Callable[[bytes], dict] | None = None
+    tensor_body: bool = False
     refusal_page: Callable[[str, int], Response] | None = None
 
 
@@ -122,15 +123,15 @@ class Router:
             self._routes |= blueprint.routes
         self._urls = app.url_map.bind("")
 
-    def match(self, environ: dict) -> Match | None:
-        """Return the route of a request, given as a WSGI environ; None if there is none."""
+    def match(self, environ: dict) -> Match | Response:
+        """Return the route of a request, given as a WSGI environ; an error if there is none."""
         path = environ["PATH_INFO"]
         if not path.isascii():
             path = path.encode("latin-1").decode("utf-8", "replace")
         # A client may append the path to an address that ends with a slash.
-        path = "/" + path.lstrip("/")
+        path = re.sub("/+", "/", path)
         try:
             name, variables = self._urls.match(path, environ["REQUEST_METHOD"])
-        except HTTPException:
-            return None
+        except HTTPException as error:
+            return failure(error)
         return Match(self._routes[name], dict(variables), path)

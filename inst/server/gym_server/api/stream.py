@@ -16,7 +16,6 @@ import numpy as np
 from gym_server.api import env_routes
 from gym_server.api.calls import Call
 from gym_server.api.exactly_once import kept_body
-from gym_server.api.failures import failure
 from gym_server.api.stream_layout import (
     ANSWER_HEAD,
     ARRAYS,
@@ -41,7 +40,7 @@ from gym_server.api.websocket import (
 )
 from gym_server.errors import GymServerError
 from gym_server.protocol import bodies
-from gym_server.protocol.answers import AnswerForm, dumps, response_to
+from gym_server.protocol.answers import AnswerForm, dumps, failure, response_to
 from gym_server.protocol.fields import RequestId, read
 from gym_server.response import JSON, Response
 
@@ -164,9 +163,9 @@ class Stream:
         """Do what a message asks for in the words of an HTTP request."""
         route = _ROUTES[what]
         if form == TENSOR_BODY:
-            if route.tensor_body is None:
+            if not route.tensor_body:
                 raise malformed_message("a reset has no tensors")
-            body = route.tensor_body(data)
+            body = bodies.loads_tensors(data, [field.name for field in route.fields])
         else:
             body = bodies.loads(data)
         fields = read(body, route.fields)

@@ -9,7 +9,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from werkzeug.exceptions import MethodNotAllowed
 
+from gym_server.errors import GymServerError, answer_to
 from gym_server.json_values import plain
 from gym_server.protocol.fields import RequestId
 from gym_server.protocol.safetensors import (
@@ -89,6 +91,18 @@ def response_to(
     if request_id is not None:
         result = {**result, "request": request_id.echo()}
     return Response(status, dumps(result))
+
+
+def failure(error: BaseException, request_id: RequestId | None = None) -> Response:
+    """Return the response for an error."""
+    status, body = answer_to(error)
+    response = response_to(body, request_id, status)
+    if isinstance(error, GymServerError):
+        return response._replace(headers=error.headers)
+    if isinstance(error, MethodNotAllowed):
+        allowed = ", ".join(sorted(error.valid_methods or ()))
+        return response._replace(headers=(("Allow", allowed),))
+    return response
 
 
 def _dumps_tensors(

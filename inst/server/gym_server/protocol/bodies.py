@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 
 from gym_server.errors import GymServerError
 from gym_server.protocol.safetensors import Parts, malformed_tensors
@@ -54,44 +55,28 @@ def loads(raw: bytes) -> dict:
     return body
 
 
-def parse_tensors(raw: bytes) -> dict:
+def loads_tensors(raw: bytes, names: Collection[str]) -> dict:
     """Return the fields of a request whose body is a safetensors file.
 
     Args:
-        raw: the body; its metadata holds the other fields as JSON, and the texts by name.
+        raw: the body; its metadata holds fields as JSON, and the texts by name.
+        names: the fields. Other metadata are ignored: writers such as safetensors' own library add
+            texts.
 
     Returns:
-        The same as ``loads()``, except that an action is ``Parts``.
+        The same as ``loads()``, except that an action is ``Parts``; and all ``tensors``.
 
     Raises:
         GymServerError: ``malformed_tensors``.
     """
     file = read_tensors(raw)
-    body = {
-        name: _json_text(name, text)
-        for name, text in file.metadata.items()
-        if name in _JSON_METADATA
-    }
+    known = [name for name in file.metadata if name in names or name == "texts"]
+    body = {name: _json_text(name, file.metadata[name]) for name in known}
     texts = body.pop("texts", {})
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise malformed_tensors("the metadata 'texts' is not a JSON object of texts")
     if any(name.partition("/")[0] == "action" for name in (*file.tensors, *texts)):
         body["action"] = Parts(file.tensors, texts)
-    return body
-
-
-def loads_file(raw: bytes) -> dict:
-    """Return the fields of a safetensors file, and its tensors as the field ``tensors``.
-
-    Raises:
-        GymServerError: ``malformed_tensors``.
-    """
-    file = read_tensors(raw)
-    body: dict = {}
-    for name, text in file.metadata.items():
-        # Written by safetensors' own library.
-        if name != "format":
-            body[name] = _json_text(name, text)
     return {**body, "tensors": file.tensors}
 
 
@@ -101,9 +86,6 @@ def _json_text(name: str, text: str) -> object:
     except (ValueError, RecursionError) as error:
         raise malformed_tensors(f"the metadata {name!r} is not valid JSON: {error}") from None
 
-
-# Other metadata are ignored: writers such as safetensors' own library add texts.
-_JSON_METADATA = ("final_obs", "info", "render", "request", "step_mask", "texts")
 
 _KIND_NAMES = {
     bool: "a boolean",

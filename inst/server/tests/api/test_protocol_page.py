@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from gym_server.api.routes import ROUTES
+from gym_server.api.app import BLUEPRINTS
+
+ROUTES = [route for bp in BLUEPRINTS for route in bp.routes.values()]
 
 PAGE = (Path(__file__).parents[2] / "PROTOCOL.md").read_text(encoding="utf-8")
 # A row of a table by its request, `GET /v1/health/`, with what is said of the request.
