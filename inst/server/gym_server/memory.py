@@ -82,18 +82,17 @@ def machine_mb(cgroup: Path = CGROUP) -> int:
     """Return the memory of the machine in MiB, or of its cgroup if that is less.
 
     Args:
-        cgroup: the mount point of control groups, version 1 or 2.
+        cgroup: the mount point of control groups of version 2.
     """
     sizes = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
     own = cgroup
     with contextlib.suppress(OSError):
         own = own_group(cgroup)
-    # A group may have as much as each group above it. The last file is of version 1.
-    files = [group / "memory.max" for group in (own, *own.parents)]
-    for file in (*files, cgroup / "memory" / "memory.limit_in_bytes"):
-        # A group without a limit says "max", or a larger number than any machine has.
+    # A group may have as much as each group above it.
+    for group in (own, *own.parents):
+        # A group without a limit says "max".
         with contextlib.suppress(OSError, ValueError):
-            sizes.append(int(file.read_text()))
+            sizes.append(int((group / "memory.max").read_text()))
     return min(sizes) // _MB
 
 

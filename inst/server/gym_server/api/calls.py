@@ -13,7 +13,7 @@ from gym_server.instances.instance import Instance
 from gym_server.manager.instance_manager import InstanceManager
 from gym_server.manager.rollouts import Rollouts
 from gym_server.monitoring.monitor_directory import MonitorRoot
-from gym_server.protocol.answers import JSON_FORM, AnswerForm
+from gym_server.protocol.answers import HTML, JSON_FORM, AnswerForm
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,8 @@ class Call(NamedTuple):
         body: the JSON object of the request, or the query of a GET.
         fields: the values of the route's fields; None for missing ones.
         form: the format of tensors that the client wants, if the route supports them.
-        url: the requested path.
-        accept: the Accept header.
         is_connected: returns whether the client still waits for a response.
-        environ: the whole request, as a WSGI environ.
+        environ: the request's head, as a WSGI environ.
     """
 
     services: Services
@@ -57,8 +55,6 @@ class Call(NamedTuple):
     body: dict
     fields: dict
     form: AnswerForm = JSON_FORM
-    url: str = ""
-    accept: str = ""
     is_connected: Callable[[], bool] = lambda: True
     environ: Mapping[str, Any] = MappingProxyType({})
 
@@ -66,6 +62,11 @@ class Call(NamedTuple):
     def instance(self) -> Instance:
         """The instance that the URL names."""
         return self.services.instances.get(self.path["instance_id"])
+
+    @property
+    def wants_html(self) -> bool:
+        """Whether a browser asks, for people."""
+        return HTML in self.environ.get("HTTP_ACCEPT", "")
 
     @property
     def wanted_form(self) -> AnswerForm:

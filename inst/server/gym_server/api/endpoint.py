@@ -48,10 +48,9 @@ class Endpoint:
         elif self._is_tensors:
             names = frozenset(field.name for field in self._fields)
             self._read = partial(bodies.loads_tensors, names=names)
-        self._accept = environ.get("HTTP_ACCEPT", "")
         self._form = JSON_FORM
         if route.tensors:
-            self._form = _wanted_form(self._accept, route.content_type)
+            self._form = _wanted_form(environ.get("HTTP_ACCEPT", ""), route.content_type)
         # Requests that end an instance are stored with those that create one: the instance's own
         # end with it.
         self._used_id = None if route.ends_instance else match.variables.get("instance_id")
@@ -70,22 +69,14 @@ class Endpoint:
             request_id = fields.pop("request", None)
         except Exception as error:
             return failure(error, fields.get("request"))
-        path, form = self._match.path, self._form
+        match, form = self._match, self._form
         call = Call(
-            self._services,
-            self._match.variables,
-            body,
-            fields,
-            form,
-            path,
-            self._accept,
-            is_connected,
-            self._environ,
+            self._services, match.variables, body, fields, form, is_connected, self._environ
         )
         if request_id is None:
             return self._perform(call, None)[0]
         asked = kept_body(raw)
-        content = path, asked, self._is_tensors, form
+        content = match.path, asked, self._is_tensors, form
         try:
             return self._exactly_once.respond(
                 request_id,

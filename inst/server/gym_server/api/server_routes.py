@@ -41,7 +41,7 @@ def shutdown(call: Call) -> dict | Response:
     """Answer the requests in progress, and stop the server."""
     call.services.stop()
     message = "Server shutting down"
-    if HTML in call.accept:
+    if call.wants_html:
         # As on the classic server.
         return Response(200, message.encode(), f"{HTML}; charset=utf-8")
     return {"message": message}

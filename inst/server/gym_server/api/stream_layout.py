@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ ANSWER_HEAD = struct.Struct("<BxHIxxxxd")
 
 # No answer is smaller, so that the heads of all usual frames have 4 bytes.
 _FEWEST_BYTES = 112
+
+# How many layouts of a kind a stream remembers.
+_MOST_LAYOUTS = 8
 
 STEP, RESET = 0, 1
 ARRAYS, JSON_BODY, TENSOR_BODY = 0, 1, 2
@@ -116,32 +120,22 @@ class StreamLayout:
         self._as_float64 = as_float64 and _fits_float64(instance.single_observation_space)
         self._action = spaces.tensor_shapes(instance.single_action_space, "action")
         self._observation = spaces.tensor_shapes(instance.single_observation_space, "observation")
-        # By the number of rows: those of all sub-environments, and of the last mask.
-        self._actions: dict[int | None, ArrayLayout] = {}
-        self._steps: dict[int | None, ArrayLayout] = {}
+        # Sub-environments end one after another, so the numbers of rows follow each other.
+        self.action = lru_cache(_MOST_LAYOUTS)(self._of_action)
+        self._step = lru_cache(_MOST_LAYOUTS)(self._of_step)
         self._reset = self._of_answer({}, self.num_envs)
 
     def first_message(self) -> bytes:
         """Return the message that tells a client the layout."""
-        step = self._of_step(self.num_envs)
+        step = self._step(self.num_envs)
         parts = {"action": self.action(self.num_envs), "step": step, "reset": self._reset}
         tables = {name: part and part.table for name, part in parts.items()}
         return dumps({"num_envs": self.num_envs, **tables})
 
     def padded(self, body: bytes) -> bytes:
         """Return JSON that is not smaller than the arrays that a client expects."""
-        step = self._of_step(self.num_envs)
+        step = self._step(self.num_envs)
         return body.ljust(_FEWEST_BYTES if step is None else step.padded_size)
-
-    def action(self, rows: int | None) -> ArrayLayout | None:
-        """Return the layout of the actions of so many rows; None if their size varies."""
-        if self._action is None:
-            return None
-        layout = self._actions.get(rows)
-        if layout is None:
-            layout = ArrayLayout(_batched(self._action, rows))
-            _remember(self._actions, rows, layout)
-        return layout
 
     def arrays(self, result: dict[str, Any]) -> bytes | None:
         """Return the arrays of a step's or a reset's result; None if they have other sizes."""
@@ -152,7 +146,7 @@ class StreamLayout:
             return None if self._reset is None else self._reset.write(result["observation"].tensors)
         tensors = dict(result["observation"].tensors)
         rows = None if self.num_envs is None else len(reward)
-        layout = self._of_step(rows)
+        layout = self._step(rows)
         assert layout is not None
         if rows is None:
             tensors["reward"] = Tensor("F64", (), struct.pack("<d", reward))
@@ -164,18 +158,13 @@ class StreamLayout:
             tensors["truncated"] = Tensor.of(result["truncated"])
         return layout.write(tensors)
 
+    def _of_action(self, rows: int | None) -> ArrayLayout | None:
+        """Return the layout of the actions of so many rows; None if their size varies."""
+        return None if self._action is None else ArrayLayout(_batched(self._action, rows))
+
     def _of_step(self, rows: int | None) -> ArrayLayout | None:
-        layout = self._steps.get(rows)
-        if layout is None:
-            each: spaces.Shapes = {
-                "reward": ("F64", ()),
-                "terminated": ("BOOL", ()),
-                "truncated": ("BOOL", ()),
-            }
-            layout = self._of_answer(each, rows)
-            if layout is not None:
-                _remember(self._steps, rows, layout)
-        return layout
+        flag = ("BOOL", ())
+        return self._of_answer({"reward": ("F64", ()), "terminated": flag, "truncated": flag}, rows)
 
     def _of_answer(self, others: spaces.Shapes, rows: int | None) -> ArrayLayout | None:
         if self._observation is None:
@@ -204,13 +193,3 @@ def _batched(shapes: spaces.Shapes, rows: int | None) -> spaces.Shapes:
     if rows is None:
         return shapes
     return {name: (dtype, (rows, *shape)) for name, (dtype, shape) in shapes.items()}
-
-
-# Sub-environments end one after another, so the numbers of rows follow each other.
-_MOST_LAYOUTS = 8
-
-
-def _remember(layouts: dict[int | None, ArrayLayout], rows: int | None, one: ArrayLayout) -> None:
-    if len(layouts) >= _MOST_LAYOUTS:
-        layouts.clear()
-    layouts[rows] = one

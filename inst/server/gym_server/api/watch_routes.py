@@ -60,10 +60,10 @@ def env_watch(call: Call) -> Response:
         status = 200
     except GymServerError as refusal:
         # A browser gets the page anyway, which shows the error and the other environments.
-        if "text/html" not in call.accept:
+        if not call.wants_html:
             raise
         status = refusal.status
-    return page(call.url, status)
+    return page(call.environ["PATH_INFO"], status)
 
 
 @bp.declare("POST", _WATCH + "key/")

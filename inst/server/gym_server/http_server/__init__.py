@@ -1,4 +1,4 @@
-"""A small HTTP/1.1 server; ``interface`` is all it knows about its application.
+"""A small HTTP/1.1 server; ``Application`` is all it knows about its application.
 
 Why it exists:
 

@@ -12,12 +12,11 @@ from collections.abc import Callable
 from enum import Enum
 from functools import lru_cache
 from http import HTTPStatus
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from httptools import HttpParserError
 
 from gym_server.http_server.head import MOST_BYTES, RequestHead
-from gym_server.http_server.interface import Application
 from gym_server.response import Admission, Response
 
 # How long a client may use the connection before it is known, in seconds, whatever it does. Longer
@@ -47,6 +46,19 @@ _LONGEST_HEAD = 4096
 
 _CHUNK_SIZE = re.compile(rb"([0-9A-Fa-f]{1,15})(?:;.*)?\r\n")
 _MOST_TRAILERS = 100
+
+
+class Application(Protocol):
+    """Makes the responses. A request's head is given as a WSGI environ."""
+
+    def admit(self, environ: dict) -> Admission | Response:
+        """Say how to answer a request before its body is read, or refuse it."""
+
+    def refuse(self, status: int, reason: str) -> Response:
+        """Answer bytes that are not a request: 400 with a reason, or 413."""
+
+    def begin_stop(self) -> None:
+        """End requests soon that would otherwise wait for longer than the stop takes."""
 
 
 class _Phase(Enum):

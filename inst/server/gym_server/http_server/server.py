@@ -13,8 +13,7 @@ import threading
 import time
 
 from gym_server import memory
-from gym_server.http_server.connection import Connection
-from gym_server.http_server.interface import Application
+from gym_server.http_server.connection import Application, Connection
 
 log = logging.getLogger(__name__)
 

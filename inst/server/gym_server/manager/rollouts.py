@@ -22,8 +22,8 @@ from gym_server.manager.rollout_request import RolloutRequest
 from gym_server.processes.pool import pool
 from gym_server.processes.worker_process import WorkerProcess
 from gym_server.protocol.safetensors import Tensor
+from gym_server.rollouts.recording import concatenated
 from gym_server.rollouts.task import Task, Unit
-from gym_server.rollouts.tensors import concatenated
 
 log = logging.getLogger(__name__)
 

@@ -213,14 +213,27 @@ def _read(raw: bytes) -> TensorFile:
     if not isinstance(metadata, dict) or not all(isinstance(v, str) for v in metadata.values()):
         raise ValueError("the metadata must be texts")
     data = memoryview(raw)[8 + length :]
-    places = {name: _place(name, entry) for name, entry in header.items()}
-    _check_places(places, len(data))
-    tensors = {
-        name: Tensor(place.dtype, place.shape, data[place.begin : place.end])
-        for name, place in places.items()
-    }
+    tensors = {name: _tensor(name, entry, data) for name, entry in header.items()}
+    offsets = sorted(entry["data_offsets"] for entry in header.values())
+    if [0, *(end for _, end in offsets)] != [*(begin for begin, _ in offsets), len(data)]:
+        raise ValueError(f"there is a gap or an overlap in its {len(data)} bytes of tensors")
     check_booleans(tensors)
     return TensorFile(tensors, metadata)
+
+
+def _tensor(name: str, entry: object, data: memoryview) -> Tensor:
+    match entry:
+        case {"dtype": str(dtype), "shape": [*shape], "data_offsets": [begin, end], **others} if (
+            not others
+            and dtype in _DTYPES
+            and all(type(number) is int and number >= 0 for number in (*shape, begin, end))
+            and end - begin == math.prod(shape) * _DTYPES[dtype].itemsize
+        ):
+            return Tensor(dtype, tuple(shape), data[begin:end])
+    raise ValueError(
+        f"tensor {name!r} needs a dtype ({', '.join(_DTYPES)}), a shape, data_offsets that fit "
+        "these, and nothing else"
+    )
 
 
 def check_booleans(tensors: Mapping[str, Tensor]) -> None:
@@ -238,42 +251,3 @@ def _unique(pairs: list[tuple[str, object]]) -> dict:
 
 
 _header = json.JSONDecoder(object_pairs_hook=_unique)
-
-
-class _Place(NamedTuple):
-    """A tensor's entry in the header."""
-
-    dtype: str
-    shape: tuple[int, ...]
-    begin: int
-    end: int
-
-
-def _place(name: str, entry: object) -> _Place:
-    if not isinstance(entry, dict) or entry.keys() != {"dtype", "shape", "data_offsets"}:
-        raise ValueError(f"tensor {name!r} needs exactly dtype, shape and data_offsets")
-    dtype, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
-    if not isinstance(dtype, str) or dtype not in _DTYPES:
-        raise ValueError(f"tensor {name!r} must have one of the dtypes {', '.join(_DTYPES)}")
-    if not _naturals(shape):
-        raise ValueError(f"tensor {name!r} has no shape")
-    if not _naturals(offsets) or len(offsets) != 2:
-        raise ValueError(f"tensor {name!r} has no offsets")
-    if offsets[1] - offsets[0] != math.prod(shape) * _DTYPES[dtype].itemsize:
-        raise ValueError(f"the offsets of tensor {name!r} do not fit its shape")
-    return _Place(dtype, tuple(shape), *offsets)
-
-
-def _naturals(value: object) -> bool:
-    return isinstance(value, list) and all(type(item) is int and item >= 0 for item in value)
-
-
-def _check_places(places: Mapping[str, _Place], length: int) -> None:
-    """Raise ValueError unless the tensors fill the data without gaps."""
-    end = 0
-    for name, place in sorted(places.items(), key=lambda item: (item[1].begin, item[1].end)):
-        if place.begin != end:
-            raise ValueError(f"there is a gap or an overlap before tensor {name!r}")
-        end = place.end
-    if end != length:
-        raise ValueError(f"the tensors have {end} bytes, and the body {length}")

@@ -17,9 +17,8 @@ from gym_server.protocol.safetensors import Tensor
 from gym_server.rollouts.environment import RolloutEnv
 from gym_server.rollouts.episode import Played, play_episode
 from gym_server.rollouts.group import play_group
-from gym_server.rollouts.recording import Recorder, check_keep, result_tensors
+from gym_server.rollouts.recording import Recorder, check_keep, concatenated, result_tensors
 from gym_server.rollouts.task import Task, Unit
-from gym_server.rollouts.tensors import concatenated
 
 # Importing it takes longer than starting a process.
 start.preload(__name__)
