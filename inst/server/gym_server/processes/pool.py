@@ -30,32 +30,20 @@ class Pool:
         # With the time each was added; the most recent one is last.
         self._idle: list[tuple[float, WorkerProcess]] = []
 
-    def take(
-        self,
-        module: str,
-        low_priority: bool = False,
-    ) -> WorkerProcess:
+    def take(self, module: str, low_priority: bool = False) -> WorkerProcess:
         """Return an unused process, and start one if necessary.
 
         Args:
-            module: the module whose functions it is to run.
-            low_priority: whether it runs at a lower priority from now on, also for later users.
-                Such processes are not given to callers that did not ask for this.
+            module: the module whose functions it runs.
+            low_priority: whether it runs at a lower priority; always the same for a module.
         """
-        process = self._take_idle(low_priority) or WorkerProcess()
-        process.module = module
-        if low_priority:
-            process.lower_priority()
-        return process
-
-    def _take_idle(self, low_priority: bool) -> WorkerProcess | None:
         with self._lock:
             for place in reversed(range(len(self._idle))):
                 process = self._idle[place][1]
-                if process.is_alive and (low_priority or not process.has_low_priority):
+                if process.is_alive and process.module == module:
                     del self._idle[place]
                     return process
-        return None
+        return WorkerProcess(module, low_priority)
 
     def put(self, process: WorkerProcess) -> None:
         """Keep a process that has done its work, or end it if there are enough."""

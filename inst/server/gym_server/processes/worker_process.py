@@ -49,7 +49,7 @@ def kill_overdue(seconds: float) -> None:
 
 
 class WorkerProcess:
-    """A process that runs the functions of one module; of another when it is taken again.
+    """A process that runs the functions of one module.
 
     Attributes:
         module: the name of the module.
@@ -57,13 +57,17 @@ class WorkerProcess:
         why: the error for every caller once it has ended, else None.
         progress: two integers that the running function may set; while it changes the first, it
             does not hang.
-        has_low_priority: whether it runs at a lower priority.
     """
 
-    def __init__(self) -> None:
-        """Start the process."""
-        self.module = ""
-        self.has_low_priority = False
+    def __init__(self, module: str, low_priority: bool = False) -> None:
+        """Start the process.
+
+        Args:
+            module: the name of the module.
+            low_priority: whether it runs at a lower priority than other processes, including the
+                server.
+        """
+        self.module = module
         self.why: GymServerError | None = None
         self._on_end: Callable[[GymServerError], None] = lambda why: None
         self._lock = threading.Lock()
@@ -101,6 +105,9 @@ class WorkerProcess:
             raise
         finally:
             theirs.close()
+        if low_priority and hasattr(os, "setpriority"):
+            with contextlib.suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, self.pid, _LOWER_PRIORITY)
         # When multiprocessing starts a process it polls all on this list, and at exit it waits for
         # all of them. Only our own thread may wait for this one.
         # The type is ignored because the list is private.
@@ -164,13 +171,6 @@ class WorkerProcess:
         # A process that even the system cannot end has no exit status.
         return self.why.again() if self.why else self._died(None)
 
-    def lower_priority(self) -> None:
-        """Run at a lower priority than other processes, including the server, from now on."""
-        if not self.has_low_priority and hasattr(os, "setpriority"):
-            with contextlib.suppress(OSError):
-                os.setpriority(os.PRIO_PROCESS, self.pid, _LOWER_PRIORITY)
-        self.has_low_priority = True
-
     # The end --------------------------------------------------------------------------------
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
@@ -201,14 +201,6 @@ class WorkerProcess:
         with self._lock:
             self._our_reason = self._our_reason or why or shutting_down()
         self._send_kill()
-
-    def end(self, why: GymServerError) -> None:
-        """Let it exit, and kill it if it does not; no call may be running."""
-        with self._lock:
-            self._our_reason = self._our_reason or why
-        self._calls.close()
-        if not self._ended.wait(_EXIT_SECONDS):
-            self._send_kill()
 
     def kill_if_overdue(self, seconds: float) -> None:
         """End it if its call has made no progress for this many seconds."""

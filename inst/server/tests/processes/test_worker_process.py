@@ -88,8 +88,7 @@ def is_running_safely(pid):
 
 
 def test_what_it_sent_before_it_ended_is_read_afterwards(eventually):
-    process = WorkerProcess()
-    process.module = "gym_server.envs.registry"
+    process = WorkerProcess("gym_server.envs.registry")
     process.begin("search", "CartPole", ())
     eventually(lambda: select.select([process._calls._pipe._socket], [], [], 0)[0])
     os.kill(process.pid, signal.SIGKILL)
