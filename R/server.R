@@ -29,9 +29,9 @@ is_running <- function(base) {
 #'   * `allow_module = c("a", "b")` names Python modules whose environments may be made.
 #'   * `token_file = "token"` names a file with a token of 16 characters or more, which replaces the
 #'   server's own one.
-#'   * Limits (with their defaults): `max_processes` (of environments, 128; besides these as many play
-#'   whole episodes, but no more than one per core) and `max_memory_mb` (of the server's process, and
-#'   of each of its processes, on Linux; three quarters of the machine's).
+#'   * Limits (with their defaults): `max_processes` (of environments, 128; besides these as many
+#'   play whole episodes, but no more than one per core) and `max_memory_mb` (of the server's
+#'   process, and of each of its processes, on Linux; three quarters of the machine's).
 #'   * `max_call_seconds` is the time after which a call that hangs ends the server, or the worker
 #'   process in which it hangs (300; 0 for no limit). `idle_minutes` is the time after which an
 #'   unused environment is removed (1,440; 0 for never).
@@ -158,8 +158,8 @@ installed_extra_hint <- function(extra, python) {
   }
 }
 
-# Options as a command line: monitor_dir = "runs" becomes --monitor-dir runs, TRUE a flag, and a vector
-# one option for each element.
+# Options as a command line: monitor_dir = "runs" becomes --monitor-dir runs, TRUE a flag, and a
+# vector one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
   check_dots_named(options, "monitor_dir = \"runs\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
