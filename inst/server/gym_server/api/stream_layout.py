@@ -5,6 +5,7 @@ The arrays are those of a safetensors file for the same request, without the fil
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping
 from functools import lru_cache
@@ -16,8 +17,8 @@ from gymnasium.spaces import Dict, Discrete, Space, Tuple
 from gym_server import spaces
 from gym_server.errors import GymServerError
 from gym_server.instances.instance import Instance
-from gym_server.protocol.answers import FLAGS, dumps
-from gym_server.protocol.safetensors import Parts, Tensor, check_booleans, places
+from gym_server.protocol.answers import dumps
+from gym_server.protocol.safetensors import DTYPES, Parts, Tensor, check_booleans, places
 
 # Of a client's message: what it asks for, the form of the rest, flags, and the request's number.
 REQUEST_HEAD = struct.Struct("<BBHxxxxd")
@@ -62,12 +63,21 @@ class ArrayLayout:
             as_float64: whether their numbers travel as float64.
         """
         self._shapes = shapes
-        self._as_float64 = as_float64
         self.table = places(
             (name, "F64" if as_float64 else dtype, shape) for name, (dtype, shape) in shapes.items()
         )
         self.size = max((entry["data_offsets"][1] for entry in self.table.values()), default=0)
         self.padded_size = max(_FEWEST_BYTES, self.size + -self.size % 8)
+        entries = self.table.values()
+        # One assignment to a field converts, copies and places an array.
+        self._record = np.dtype(
+            {
+                "names": list(self.table),
+                "formats": [(DTYPES[entry["dtype"]], _flat(entry["shape"])) for entry in entries],
+                "offsets": [entry["data_offsets"][0] for entry in entries],
+                "itemsize": self.padded_size,
+            }
+        )
 
     def read(self, data: bytes) -> Parts:
         """Return the arrays of a message.
@@ -88,20 +98,33 @@ class ArrayLayout:
             raise malformed_message(str(error)) from None
         return Parts(tensors)
 
-    def write(self, tensors: Mapping[str, Tensor]) -> bytes | None:
-        """Return arrays as bytes, padded; None if one has another dtype or shape."""
-        for name, (dtype, shape) in self._shapes.items():
-            tensor = tensors[name]
-            if tensor.dtype != dtype or tensor.shape != shape:
+    def write(self, tensors: Mapping[str, Tensor], others: Mapping[str, Any]) -> bytes | None:
+        """Return arrays as bytes, padded; None if a tensor has another dtype or shape.
+
+        Args:
+            tensors: some of the arrays.
+            others: all others, of the right shape.
+        """
+        record = np.zeros((), self._record)
+        for name, tensor in tensors.items():
+            if (tensor.dtype, tensor.shape) != self._shapes[name]:
                 return None
-        if not self._as_float64:
-            whole = b"".join([tensors[name].data for name in self.table])
-            return whole.ljust(self.padded_size, b"\0")
-        numbers = np.zeros(self.padded_size // 8)
-        for name, place in self.table.items():
-            begin, end = place["data_offsets"]
-            numbers[begin // 8 : end // 8] = tensors[name].flat()
-        return numbers.astype("<f8", copy=False).tobytes()
+            record[name] = tensor.flat()
+        for name, array in others.items():
+            record[name] = array
+        return record.tobytes()
+
+
+def _flat(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return (math.prod(shape),) if shape else ()
+
+
+# What a step returns of each sub-environment besides its observation.
+_EACH: spaces.Shapes = {
+    "reward": ("F64", ()),
+    "terminated": ("BOOL", ()),
+    "truncated": ("BOOL", ()),
+}
 
 
 class StreamLayout:
@@ -141,30 +164,19 @@ class StreamLayout:
         """Return the arrays of a step's or a reset's result; None if they have other sizes."""
         if self._observation is None or "final_obs" in result:
             return None
-        reward = result.get("reward")
-        if reward is None:
-            return None if self._reset is None else self._reset.write(result["observation"].tensors)
-        tensors = dict(result["observation"].tensors)
-        rows = None if self.num_envs is None else len(reward)
-        layout = self._step(rows)
+        each = {name: result[name] for name in _EACH if name in result}
+        layout = self._reset
+        if each:
+            layout = self._step(None if self.num_envs is None else len(each["reward"]))
         assert layout is not None
-        if rows is None:
-            tensors["reward"] = Tensor("F64", (), struct.pack("<d", reward))
-            tensors["terminated"] = FLAGS[result["terminated"]]
-            tensors["truncated"] = FLAGS[result["truncated"]]
-        else:
-            tensors["reward"] = Tensor.of(np.asarray(reward, np.float64))
-            tensors["terminated"] = Tensor.of(result["terminated"])
-            tensors["truncated"] = Tensor.of(result["truncated"])
-        return layout.write(tensors)
+        return layout.write(result["observation"].tensors, each)
 
     def _of_action(self, rows: int | None) -> ArrayLayout | None:
         """Return the layout of the actions of so many rows; None if their size varies."""
         return None if self._action is None else ArrayLayout(_batched(self._action, rows))
 
     def _of_step(self, rows: int | None) -> ArrayLayout | None:
-        flag = ("BOOL", ())
-        return self._of_answer({"reward": ("F64", ()), "terminated": flag, "truncated": flag}, rows)
+        return self._of_answer(_EACH, rows)
 
     def _of_answer(self, others: spaces.Shapes, rows: int | None) -> ArrayLayout | None:
         if self._observation is None:

@@ -41,8 +41,10 @@ _NAMES = {
     "u8": "U64",
     "b1": "BOOL",
 }
-_DTYPES = {name: np.dtype(code).newbyteorder("<") for code, name in _NAMES.items()}
+DTYPES = {name: np.dtype(code).newbyteorder("<") for code, name in _NAMES.items()}
 _NATIVE = {name: np.dtype(code) for code, name in _NAMES.items()}
+# By dtypes of little-endian numbers, because their texts take longer to make than to copy an array.
+_NAMES_OF_LITTLE = {dtype: name for name, dtype in DTYPES.items()}
 
 
 def tensor_name(dtype: np.dtype) -> str:
@@ -65,10 +67,10 @@ class Tensor(NamedTuple):
             array: the array. KeyError is raised if the format has no name for its dtype.
             by_column: whether to transpose it, see ``COLUMN_TENSORS``.
         """
-        dtype = array.dtype
-        name = _NAMES[dtype.str[1:]]
-        if dtype != _DTYPES[name]:
-            array = array.astype(_DTYPES[name], copy=False)
+        name = _NAMES_OF_LITTLE.get(array.dtype)
+        if name is None:
+            name = tensor_name(array.dtype)
+            array = array.astype(DTYPES[name])
         if array.ndim < 2:
             return cls(name, array.shape, array.tobytes())
         if by_column:
@@ -83,7 +85,7 @@ class Tensor(NamedTuple):
 
     def flat(self) -> np.ndarray:
         """Return the numbers in the order of their bytes."""
-        return np.frombuffer(self.data, _DTYPES[self.dtype])
+        return np.frombuffer(self.data, DTYPES[self.dtype])
 
 
 @dataclass(slots=True)
@@ -164,8 +166,8 @@ def places(entries: Iterable[tuple[str, str, tuple[int, ...]]]) -> dict[str, dic
     header: dict[str, dict[str, Any]] = {}
     begin = 0
     # The widest dtypes first, so that all tensors are aligned.
-    for name, dtype, shape in sorted(entries, key=lambda entry: -_DTYPES[entry[1]].itemsize):
-        end = begin + math.prod(shape) * _DTYPES[dtype].itemsize
+    for name, dtype, shape in sorted(entries, key=lambda entry: -DTYPES[entry[1]].itemsize):
+        end = begin + math.prod(shape) * DTYPES[dtype].itemsize
         header[name] = {"dtype": dtype, "shape": shape, "data_offsets": (begin, end)}
         begin = end
     return header
@@ -225,13 +227,13 @@ def _tensor(name: str, entry: object, data: memoryview) -> Tensor:
     match entry:
         case {"dtype": str(dtype), "shape": [*shape], "data_offsets": [begin, end], **others} if (
             not others
-            and dtype in _DTYPES
+            and dtype in DTYPES
             and all(type(number) is int and number >= 0 for number in (*shape, begin, end))
-            and end - begin == math.prod(shape) * _DTYPES[dtype].itemsize
+            and end - begin == math.prod(shape) * DTYPES[dtype].itemsize
         ):
             return Tensor(dtype, tuple(shape), data[begin:end])
     raise ValueError(
-        f"tensor {name!r} needs a dtype ({', '.join(_DTYPES)}), a shape, data_offsets that fit "
+        f"tensor {name!r} needs a dtype ({', '.join(DTYPES)}), a shape, data_offsets that fit "
         "these, and nothing else"
     )
 
