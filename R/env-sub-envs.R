@@ -80,7 +80,10 @@ make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call
   # There are no more sub-environments than episodes. Without a number the server chooses the
   # workers.
   workers <- num_workers %||% if (max_envs < few_episodes) 0L
-  env <- if (!is.null(num_envs)) make_seeded(num_envs, workers)
+  env <- if (!is.null(num_envs)) {
+    # A single environment steps in half the time of one with a single sub-environment.
+    if (num_envs == 1 && is.null(num_workers)) make(NULL) else make_seeded(num_envs, workers)
+  }
   for (n in if (is.null(num_envs)) counts_to_try(min(max_envs, full))) {
     env <- env %||% if_supported(make_seeded(n, if (!is.null(workers)) min(workers, n)))
   }

@@ -31,6 +31,18 @@ test_that("a sub-environment may be reset alone, and the others take no step", {
   expect_identical(lakes$step(c(2L, 2L, 2L), 1:3)$observation, c(2L, 1L, 2L))
 })
 
+test_that("one sub-environment is an environment without any, with the same results", {
+  alone <- as_vector_env("Acrobot-v1", num_envs = 1, client = test_client())
+  withr::defer(alone$close())
+  expect_null(alone$env$num_envs)
+  policy <- function(observation) as.integer(observation[, 1] > 0)
+  played <- lapply(list(NULL, 0), function(num_workers) {
+    rollout("Acrobot-v1", policy, 2, max_steps = 5, num_envs = 1, num_workers = num_workers,
+            seed = 1, client = test_client())
+  })
+  expect_equal(as.data.frame(played[[1L]]), as.data.frame(played[[2L]]))
+})
+
 test_that("what was made before is played as it is, and stays open", {
   env <- local_env("CartPole-v1", num_envs = 3, vectorization_mode = "sync")
   seen <- as_vector_env(env)
