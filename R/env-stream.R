@@ -111,7 +111,7 @@ numbers_message <- function(request, count, read) {
   first <- as.raw(c(0x82, 0x7e, size %/% 256L, size %% 256L, 0, 0, 200, 0))
   list(
     count = count, read = read, read_answer = result, url = request$url,
-    usual = c(readBin(first, "double", endian = "little"), 0),
+    usual = readBin(first, "double", endian = "little"),
     read_bytes = function(bytes, json) {
       read(c(double(before_numbers), readBin(bytes, "double", count, endian = "little")), json)
     }

@@ -221,7 +221,10 @@ ask_stream <- function(stream, message, content, head, call) {
   on.exit(if (stream$busy) drop_stream(stream))
   answer <- exchange(stream$con, sent, message$count)
   # The usual answer: arrays, nothing after them.
-  if (identical(answer[1:3], c(message$usual, number)) && length(answer) == message$count) {
+  is_usual <- !is.null(message$usual) && length(answer) == message$count &&
+    answer[[1L]] == message$usual && answer[[2L]] == 0 && answer[[3L]] == number
+  # NA: such as a ping of another server with bytes that are no numbers.
+  if (isTRUE(is_usual)) {
     stream$busy <- FALSE
     return(list(message$read(answer)))
   }

@@ -94,9 +94,10 @@ json_writer.gym_space_box <- function(space) {
 array_writer <- function(space, n) {
   if (!is.null(n)) {
     write <- tensors_writer(space, n)
+    write_integers <- int64_writer(n)
     return(function(values) {
       tensors <- write(values)
-      if (is.integer(tensors)) int64_bytes(tensors) else tensors$action$bytes
+      if (is.integer(tensors)) write_integers(tensors) else tensors$action$bytes
     })
   }
   if (inherits(space, "gym_space_discrete") && space$n <= most_prepared &&
@@ -125,7 +126,7 @@ most_prepared <- 1024
 
 discrete_writer <- function(space) {
   values <- as.integer(space$start + (seq_len(space$n) - 1L))
-  bytes <- lapply(values, int64_bytes)
+  bytes <- lapply(values, int64_writer(1L))
   before <- space$start - 1
   n <- length(bytes)
   function(value) {
@@ -136,8 +137,17 @@ discrete_writer <- function(space) {
   }
 }
 
-int64_bytes <- function(integers) {
-  writeBin(as.vector(rbind(integers, -(integers < 0L))), raw(), endian = "little")
+# Makes the function that writes `n` integers as int64. Each has two halves, and the second one is
+# zero except for negative numbers.
+int64_writer <- function(n) {
+  zeros <- integer(2L * n)
+  first <- seq.int(1L, by = 2L, length.out = n)
+  function(integers) {
+    halves <- zeros
+    halves[first] <- integers
+    if (min(integers) < 0L) halves[first + 1L] <- -(integers < 0L)
+    writeBin(halves, raw(), endian = "little")
+  }
 }
 
 #' Make the function that checks a batch of actions and puts it into tensors
