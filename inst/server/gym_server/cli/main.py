@@ -70,7 +70,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     allow_many_open_files()
     memory.limit(options.max_memory_mb)
-    stop = _Stop()
+
+    def stop() -> None:
+        server.stop()
+
     try:
         monitor_dir = _prepare_monitor_dir(options.monitor_dir)
         front = os.environ.pop(FRONT_VARIABLE, None)
@@ -99,7 +102,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     )
     server = Server(app, listener, Config.max_body_bytes)
-    stop.server = server
     _begin(options, server.port, stop)
     _serve(app, server)
     return 0
@@ -167,16 +169,6 @@ def _why_not(error: OSError, options: argparse.Namespace) -> str:
 def _fail(reason: str) -> int:
     print(f"gym_server: {reason}", file=sys.stderr, flush=True)
     return 1
-
-
-class _Stop:
-    """Stops the server, which is created after the application that may ask for it."""
-
-    server: Server | None = None
-
-    def __call__(self) -> None:
-        if self.server is not None:
-            self.server.stop()
 
 
 def _stop_on_signals(stop: Callable[[], None]) -> None:

@@ -64,13 +64,6 @@ def _(space: Any, batch: Any) -> list:
     return [from_parts(space, member) for member in zip(*parts, strict=True)]
 
 
-def member_of(space: Space, batch: Any, row: int) -> object:
-    """Return one member of a batch, in the format of Gymnasium's vector environments."""
-    if isinstance(space, (Tuple, Dict)):
-        return from_parts(space, [member_of(part, batch[key], row) for key, part in keyed(space)])
-    return batch[row]
-
-
 def join(space: Space, batches: list) -> Any:
     """Concatenate batches in the format of Gymnasium's vector environments."""
     if len(batches) == 1:

@@ -13,7 +13,7 @@ from gym_server.envs.drawing import Drawing
 from gym_server.envs.registry import module_of
 from gym_server.errors import GymServerError
 from gym_server.rendering.render_thread import RenderThread
-from gym_server.spaces.stacking import member_of
+from gym_server.spaces.stacking import unstack
 
 # The most sub-environments of an environment that draws all of them at once.
 _MOST_DRAWN_AT_ONCE = 16
@@ -129,7 +129,7 @@ class EntryPointEnv:
 
     def observed(self, sub_env: int, batch: object) -> object:
         """Return the last observation of a sub-environment, given the last batch."""
-        return member_of(self.single_observation_space, batch, sub_env)
+        return unstack(self.single_observation_space, batch)[sub_env]
 
     def report_end(self, on_end: Callable[[GymServerError], None]) -> None:
         """Do nothing: this process does not end by itself."""

@@ -5,7 +5,7 @@ from faulty_envs import SPACES
 from gymnasium.vector.utils import batch_space, create_empty_array
 
 from gym_server.protocol.answers import dumps
-from gym_server.spaces.stacking import member_of, stack
+from gym_server.spaces.stacking import stack, unstack
 from gym_server.viewing.observation_summary import entries
 
 
@@ -54,17 +54,16 @@ def test_an_observation_of_any_space_can_be_looked_at(kind):
         assert dumps(seen)
 
 
-@pytest.mark.parametrize("kind", SPACES)
+@pytest.mark.parametrize("kind", [name for name in SPACES if name != "nothing"])
 def test_a_sub_env_is_taken_out_of_a_batch(kind):
     space = SPACES[kind]
     space.seed(4)
     members = [space.sample() for _ in range(3)]
     batch = stack(space, members)
-    for sub_env, member in enumerate(members):
-        assert entries(member_of(space, batch, sub_env)) == entries(member)
+    assert list(map(entries, unstack(space, batch))) == list(map(entries, members))
 
 
 def test_what_gymnasium_batches_can_be_taken_apart():
     space = gymnasium.spaces.Dict({"a": gymnasium.spaces.Box(0, 1, (2,))})
     batch = create_empty_array(batch_space(space, 2).spaces["a"], n=2)
-    assert member_of(space, {"a": batch}, 1)["a"].shape == batch[1].shape
+    assert unstack(space, {"a": batch})[1]["a"].shape == batch[1].shape
