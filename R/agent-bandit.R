@@ -160,15 +160,3 @@ print.gym_bandit_learning <- function(x, ...) {
 
 #' @export
 as.data.frame.gym_bandit_learning <- function(x, row.names = NULL, optional = FALSE, ...) x$curve
-
-# The column of the largest number in each row; of several one is drawn.
-any_best_column <- function(x) {
-  column <- max.col(x, "first")
-  tied <- which(column != max.col(x, "last"))
-  if (length(tied)) {
-    rows <- x[tied, , drop = FALSE]
-    best <- rows == row_max(rows)
-    column[tied] <- max.col(best * (1 + stats::runif(length(rows))), "first")
-  }
-  column
-}

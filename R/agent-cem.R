@@ -71,7 +71,7 @@ agent_tell.gym_agent_cem <- function(agent, results) {
   elite <- results$weights[best, , drop = FALSE]
   mean <- colMeans(elite)
   coef(agent$policy) <- mean
-  # One candidate has no standard deviation. With 0 nothing would be tried any more.
+  # A single candidate has no standard deviation, and with 0 all candidates would be the same.
   if (agent$elite > 1L) {
     agent$deviation <- sqrt(colMeans((elite - rep(mean, each = agent$elite))^2))
   }

@@ -106,12 +106,12 @@ learner_of.gym_agent_q <- function(agent, draw) {
   toward <- learning$store$toward
   discount <- agent$discount
   rate <- agent$learning_rate
-  # A call less in each step is a tenth of its time.
+  # A rate that is a number is read once: a call takes a tenth of a step's time.
   changes <- is.function(rate)
   share <- if (changes) 0 else rate
   taken <- agent$taken
   memory <- if (agent$planning > 0L) new_planning_memory(agent, learning$store)
-  # A step then changes values of the state alone that it was taken in.
+  # A step then changes only values of its own state.
   own_row <- identical(agent$basis$each, 1L) && is.null(memory)
   new_steps(
     agent, learning,

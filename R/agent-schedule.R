@@ -34,7 +34,7 @@ schedule_exponential <- function(from, to, duration) {
   })
 }
 
-# Learners ask in each step; pmin() would take as long as all the rest of it.
+# Learners call this in each step. pmin() would take as long as the rest of the step.
 share_passed <- function(taken, duration) {
   share <- taken / duration
   share[share > 1] <- 1

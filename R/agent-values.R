@@ -272,8 +272,7 @@ abort_diverged <- function() {
   )
 }
 
-# The place that a number from 0 to 1 falls on, if each place has a share proportional to its
-# weight.
+# Draws a place with a probability proportional to its weight; `u` is a random number from 0 to 1.
 draw_place <- function(weight, u) {
   until <- cumsum(weight)
   count <- length(until)

@@ -26,8 +26,8 @@ is_wrong <- function(check) {
   any(vapply(check$found, function(finding) finding$severity == "wrong", NA))
 }
 
-# Plays random valid actions in all sub-environments together, until the first of them ends. Returns
-# their steps, one sub-environment after the other.
+# Plays episodes of random valid actions. With several sub-environments an episode goes on until the
+# first of them ends. Returns the steps, one sub-environment after the other.
 play_by_model <- function(check, model, seed) {
   possible <- possible_actions(model)
   starts <- steps <- list()
@@ -54,7 +54,7 @@ steps_by_model <- function(check, model, possible, state, seed) {
   ended <- FALSE
   while (!ended && length(steps) < most_compared_in_episode && !is_wrong(check)) {
     choices <- possible[state_rows(model, state), , drop = FALSE]
-    # In a state without actions, by the model, the episode should have ended.
+    # A state without actions is an end by the model, so the episode should have ended there.
     if (!all(rowSums(choices) > 0)) break
     action <- state_numbers(model$action_space)[draw_by_row(choices / rowSums(choices))]
     place <- paste0("step ", length(steps) + 1L, " of the episode with seed ", seed)

@@ -107,6 +107,6 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
       action_space = place$action_space, env_id = place$env_id,
       wrappers = place$wrappers, policy = place$policy
     ),
-    class = c("gym_parts_map", "gym_decision_map")
+    class = c("gym_state_map", "gym_decision_map")
   )
 }

@@ -26,16 +26,18 @@ autoplot.gym_decision_map <- function(object, ...) {
     ggplot2::geom_raster(ggplot2::aes(fill = .data$shown)) +
     data$fill +
     border_line(data) +
-    region_names(data$regions) +
     path_layers(object$path) +
     ggplot2::scale_x_continuous(expand = c(0, 0)) +
     ggplot2::scale_y_continuous(expand = c(0, 0)) +
-    picture_labels(
-      env_text(object) %||% "Decision map", policy_subtitle(object),
-      x = observation_labels(described_id(object), object$x),
-      y = observation_labels(described_id(object), object$y)
-    ) +
+    map_labels(object, policy_subtitle(object)) +
     theme_gym()
+}
+
+map_labels <- function(x, subtitle, axes = TRUE, ...) {
+  of_part <- function(name) if (axes) observation_labels(described_id(x), x[[name]])
+  labels <- Filter(Negate(is.null), list(x = of_part("x"), y = of_part("y")))
+  title <- env_text(x) %||% "Decision map"
+  do.call(picture_labels, c(list(title, subtitle), labels, list(...)))
 }
 
 # The line between two actions, if both occur: ggplot2 warns about an empty line.
@@ -47,14 +49,6 @@ border_line <- function(data) {
   if (data$border > inside[[1L]] && data$border < inside[[2L]]) {
     ggplot2::geom_contour(
       ggplot2::aes(z = .data$shown), breaks = data$border, colour = "black", linewidth = 0.8
-    )
-  }
-}
-
-region_names <- function(regions) {
-  if (NROW(regions)) {
-    ggplot2::geom_text(
-      ggplot2::aes(label = .data$label), regions, fontface = "bold", size = 3.5
     )
   }
 }
@@ -90,9 +84,9 @@ decision_plot_data <- function(x) {
 # differences.
 output_map <- function(x, points) {
   reach <- max(abs(points$shown - 0.5), 0.01)
+  above <- paste0("output, above 0.5:\n", x$actions[[2L]])
   list(
-    points = points, fill = diverging_fill("output", 0.5 + c(-reach, reach)), border = 0.5,
-    regions = region_labels(points, 1 + (points$shown > 0.5), x$actions, x$path, needed = TRUE)
+    points = points, fill = diverging_fill(above, 0.5 + c(-reach, reach)), border = 0.5
   )
 }
 
@@ -109,97 +103,145 @@ diverging_fill <- function(name, limits) {
 
 choice_map <- function(x, points) {
   start <- as.integer(sub(":.*", "", x$actions[[1L]]))
-  taken <- points$shown - start + 1
   numbers <- start + seq_along(x$actions) - 1L
-  # Of many actions the key is a scale.
-  few <- length(numbers) <= most_named_actions
-  regions <- if (few) region_labels(points, taken, x$actions, x$path)
+  found <- x$actions[sort(unique(points$shown - start + 1))]
   points$shown <- shown_actions(points$shown, numbers, x$actions)
-  found <- x$actions[sort(unique(taken))]
-  list(
-    points = points, regions = regions,
-    fill = action_fill(
-      numbers, x$actions, taken = found,
-      # If all names are in the regions, a key is not needed.
-      guide = if (all(found %in% regions$label)) "none" else rows_of_key(found)
-    )
+  list(points = points, fill = action_fill(numbers, x$actions, taken = found))
+}
+
+# States -------------------------------------------------------------------------------
+
+#' Plot what a policy does in each state
+#'
+#' Show the action of a policy in each state as a colour and an arrow or a letter. Supported grids
+#' are FrozenLake, CliffWalking, Taxi (for one passenger and destination) and any other grid whose
+#' `columns` you give. Otherwise each state has a point. States without an action, such as terminal
+#' ones and those that were never visited, are empty (see [decision_map()]). If there are more than
+#' six actions, the colours are a scale of their numbers.
+#'
+#' If observations have several parts with few values each, two of them are on the axes, and there
+#' is a panel for each value of the others. Where a state has room, it carries the number of its
+#' action. For Blackjack this is figure 5.2 of Sutton and Barto (2018).
+#'
+#' With `type = "q"` it shows the values of all actions instead, if the policy is a table of values:
+#' a triangle for each direction, as in [plot.gym_solution()].
+#'
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
+#'
+#' @inheritParams plot.gym_solution
+#' @param x,object The result of [decision_map()] for Discrete observations, or for those of several
+#'   parts with few values each.
+#' @param columns The number of columns of the grid, whose states are numbered row by row from the
+#'   upper left. `NULL`, the default, for a known environment: 12 for CliffWalking, and as many as
+#'   rows for FrozenLake.
+#' @param type What to show, a string: `"actions"`, the default, or `"q"`, the values of all
+#'   actions.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if `type` is `"q"` and the policy is not a table.
+#' @rdname plot.gym_state_map
+#' @exportS3Method ggplot2::autoplot
+#' @examples
+#' right <- policy_table(matrix(c(0, 0, 1, 0), 16, 4, byrow = TRUE))
+#' @examplesIf gym:::can_start_server()
+#' plot(decision_map("FrozenLake-v1", right))
+#' learned <- learn_q("FrozenLake-v1", total_steps = 20000, is_slippery = FALSE, seed = 1)
+#' plot(decision_map("FrozenLake-v1", learned$policy), type = "q")
+#' # Sticks with 20 or 21.
+#' sums <- rep(0:31, each = 22)
+#' sticks <- policy_table(cbind(sums >= 20, sums < 20) + 0)
+#' plot(decision_map("Blackjack-v1", sticks, "dealer_card", "player_sum", xlim = c(1, 10),
+#'                   ylim = c(12, 21)))
+autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), columns = NULL,
+                                   directions = NULL, passenger = 2, destination = 0) {
+  check_dots_empty(...)
+  by_parts <- object$kind == "parts"
+  type <- check_choice(type[1L], c("actions", if (!by_parts) "q"), arg = "type")
+  data <- if (by_parts) {
+    parts_map_data(object)
+  } else {
+    state_map_data(object, columns, directions, passenger, destination)
+  }
+  if (type == "q") data$q <- q_of_table(object, data)
+  picture <- if (is.null(data$columns)) {
+    if (type == "q") q_cells(data) else action_points(data)
+  } else {
+    grid_picture(data, if (type == "q") q_layers(data) else taken_layers(data))
+  }
+  shown <- if (type == "q") "values of actions" else policy_subtitle(object)
+  picture + map_labels(object, c(shown, taxi_subtitle(data)), axes = by_parts, width = 40)
+}
+
+# A colour for the action that is taken in each cell.
+taken_layers <- function(data) {
+  cells <- data$cells[!is.na(data$cells$action), ]
+  cells$shown <- shown_actions(cells$action, data$numbers, data$labels)
+  taken <- intersect(data$labels, data$labels[match(cells$action, data$numbers)])
+  c(
+    list(
+      cell_tiles(ggplot2::aes(fill = .data$shown), cells), cell_tiles(fill = NA),
+      action_fill(data$numbers, data$labels, "action", taken, ggplot2::guide_legend())
+    ),
+    action_layers(data, cells)
   )
 }
 
-#' Place the names of regions
-#'
-#' A name is in the middle of the places in its region where it fits and does not cover the path. If
-#' there is none, the path does not count, and if there is still none, there is no name.
-#' @param region The number of each point's region, from 1.
-#' @param path The path of episodes, or `NULL`.
-#' @param needed Whether a region has a name even if it does not fit, because no key has it.
+# The action in each state without a grid.
+action_points <- function(data) {
+  ggplot2::ggplot(data$cells, ggplot2::aes(.data$state, .data$action)) +
+    ggplot2::geom_point(colour = gym_colours[["blue"]], na.rm = TRUE) +
+    ggplot2::expand_limits(y = range(data$numbers)) +
+    state_axes(data)
+}
+
+q_of_table <- function(x, data, call = rlang::caller_env()) {
+  if (!inherits(x$policy, "gym_policy_table")) {
+    gym_abort(
+      paste0("Values of actions are those of a `policy_table()`, not of ",
+             describe_argument(x$policy), "."),
+      class = "gym_error_argument", argument = "type", value = x$policy, call = call
+    )
+  }
+  q <- x$policy$q
+  data$cells$value <- ifelse(is.na(data$cells$action), NA, 0)
+  q_of_cells(q, x$grid$state, data)
+}
+
+#' Compute the data of a map of states
+#' @return As [solution_plot_data()], with `action`, a number or `NA`, instead of values, and the
+#'   `numbers` and `labels` of all actions.
 #' @noRd
-region_labels <- function(points, region, labels, path = NULL, needed = FALSE) {
-  x <- unique(points$x)
-  y <- unique(points$y)
-  region <- matrix(region, length(x))
-  crossed <- path_cells(path, x, y)
-  found <- sort(unique(as.vector(region)))
-  found <- found[vapply(found, function(i) mean(region == i), 0) > 0.02]
-  at <- lapply(found, function(i) {
-    inside <- region == i
-    room <- room_for_name(inside & !crossed, labels[[i]])
-    if (!any(room)) room <- room_for_name(inside, labels[[i]])
-    if (any(room)) region_middle(room) else if (needed) region_middle(inside)
-  })
-  there <- lengths(at) > 0L
-  at <- matrix(as.integer(unlist(at)), ncol = 2L, byrow = TRUE)
-  data.frame(x = x[at[, 1L]], y = y[at[, 2L]], label = labels[found[there]])
+# Where the states stand, as solution_plot_data() returns it.
+state_map_data <- function(x, columns, directions, passenger, destination,
+                           call = rlang::caller_env()) {
+  check_count(columns, allow_null = TRUE, call = call)
+  cells <- x$grid
+  known <- known_grid(x$env_id %||% "")
+  numbers <- state_numbers(x$action_space)
+  directions <- action_directions(directions, known, numbers, call)
+  cells$does <- directions[match(cells$action, numbers)]
+  labels <- action_names(x$env_id, length(numbers), numbers[[1L]])
+  cells$ink <- "black"
+  side <- sqrt(nrow(cells))
+  own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
+  placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call)
+  c(placed, list(directions = directions, numbers = numbers, labels = labels))
 }
 
-# The places around which a name fits into an area of points, in a picture of four inches, whose
-# panel is about 3.2 inches wide and 2 inches high.
-room_for_name <- function(inside, label) {
-  reach <- ceiling(dim(inside) * c(0.042 * nchar(label) / 3.2, 0.1 / 2))
-  t(within_reach(t(within_reach(inside, reach[[1L]])), reach[[2L]]))
-}
-
-# The cells of a column that have only `TRUE` this far above and below.
-within_reach <- function(inside, reach) {
-  n <- nrow(inside)
-  outside <- apply(rbind(0, !inside), 2L, cumsum)
-  fits <- seq_len(n) > reach & seq_len(n) <= n - reach
-  at <- which(fits)
-  free <- outside[at + reach + 1L, , drop = FALSE] == outside[at - reach, , drop = FALSE]
-  inside[] <- FALSE
-  inside[at, ] <- free
-  inside
-}
-
-# The points of a map that a path crosses, with the lines between its steps.
-path_cells <- function(path, x, y) {
-  crossed <- matrix(FALSE, length(x), length(y))
-  nearest <- function(values, at) round((values - at[[1L]]) / (at[[2L]] - at[[1L]])) + 1
-  for (way in if (!is.null(path)) split(path, path$episode)) {
-    n <- nrow(way)
-    between <- if (n > 1L) seq(1, n, by = 0.05) else 1
-    part <- function(values) if (n > 1L) stats::approx(seq_len(n), values, between)$y else values
-    cells <- cbind(nearest(part(way$x), x), nearest(part(way$y), y))
-    shown <- cells[, 1L] %in% seq_along(x) & cells[, 2L] %in% seq_along(y)
-    crossed[cells[shown, , drop = FALSE]] <- TRUE
-  }
-  crossed
-}
-
-# Remove border points again and again until none is left. The last ones are in the middle.
-region_middle <- function(inside) {
-  repeat {
-    n <- nrow(inside)
-    m <- ncol(inside)
-    core <- inside &
-      rbind(FALSE, inside[-n, , drop = FALSE]) & rbind(inside[-1L, , drop = FALSE], FALSE) &
-      cbind(FALSE, inside[, -m, drop = FALSE]) & cbind(inside[, -1L, drop = FALSE], FALSE)
-    if (!any(core)) {
-      break
-    }
-    inside <- core
-  }
-  left <- which(inside, arr.ind = TRUE)
-  middle <- colMeans(left)
-  left[which.min(colSums((t(left) - middle)^2)), ]
+# The parts on the axes are the columns and the rows; `panels` are those of the other parts that
+# have several values.
+parts_map_data <- function(x) {
+  cells <- x$grid
+  counts <- lengths(lapply(cells[c(x$x, x$y, x$panels)], unique))
+  cells$column <- cells[[x$x]]
+  cells$row <- cells[[x$y]]
+  cells$ink <- "black"
+  numbers <- state_numbers(x$action_space)
+  data <- list(
+    columns = prod(counts[-2L]), rows = counts[[2L]], panels = x$panels[counts[x$panels] > 1L],
+    has_axes = TRUE, numbers = numbers, labels = x$actions
+  )
+  readable <- 0.4 * cell_width(data) / max(nchar(numbers)) > 1.5
+  cells$does <- if (readable) as.character(cells$action) else ""
+  c(data, list(cells = cells))
 }

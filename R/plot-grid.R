@@ -1,10 +1,21 @@
 # States on a grid: where they are and what is drawn in their cells.
 
 # A picture of cells with the columns `row` and `column`. `layers` are below the environment's
-# marks.
+# marks. Parts of an observation have axes, and panels for the others.
 grid_picture <- function(data, layers) {
-  ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
-    layers +
+  picture <- ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) + layers
+  if (isTRUE(data$has_axes)) {
+    return(
+      picture +
+        (if (length(data$panels)) {
+          ggplot2::facet_wrap(data$panels, labeller = ggplot2::label_both)
+        }) +
+        ggplot2::scale_x_continuous(breaks = few_breaks, expand = c(0, 0)) +
+        ggplot2::scale_y_continuous(breaks = few_breaks, expand = c(0, 0)) +
+        theme_gym()
+    )
+  }
+  picture +
     taxi_layers(data) +
     ggplot2::scale_x_continuous(expand = c(0.01, 0)) +
     ggplot2::scale_y_reverse(expand = c(0.01, 0)) +

@@ -192,7 +192,8 @@ place_weights <- function(policy, neurons, digits) {
   })
   weights <- do.call(rbind, each)
   largest <- max(abs(unlist(policy$weights)))
-  along <- label_places(weights)
+  # Where lines are apart, near their beginning.
+  along <- 0.26
   weights$label_x <- weights$x + along * (weights$xend - weights$x)
   weights$label_y <- weights$y + along * (weights$yend - weights$y)
   weights$sign <- ifelse(weights$weight < 0, "negative", "positive")
@@ -204,21 +205,6 @@ place_weights <- function(policy, neurons, digits) {
     ""
   }
   weights
-}
-
-# The place of a weight's number along its line, from 0 to 1. It is the same for a whole layer: as
-# near to the middle as possible, where the lines are at least 85 % of their largest distance apart.
-label_places <- function(weights) {
-  apart <- function(layer, along) {
-    heights <- sort(layer$y + along * (layer$yend - layer$y))
-    if (length(heights) > 1L) min(diff(heights)) else 1
-  }
-  candidates <- seq(0.5, 0.14, by = -0.04)
-  best <- vapply(split(weights, weights$layer), function(layer) {
-    distance <- vapply(candidates, apart, 0, layer = layer)
-    candidates[[which(distance >= 0.85 * max(distance))[[1L]]]]
-  }, 0)
-  unname(best[as.character(weights$layer)])
 }
 
 input_labels <- function(policy) {

@@ -4,11 +4,11 @@
 #' letter. Supported grids are FrozenLake, CliffWalking, Taxi (for one passenger and destination)
 #' and any other grid whose `columns` you give. Marks show goals and pits, where episodes end. Cells
 #' that an episode never enters, such as walls, are empty. Other models have a point for each state,
-#' with its action; for more than 30 states the actions are in a panel of their own.
+#' and the actions in a panel of their own.
 #'
 #' `type = "q"` shows the value of each action. Each cell has a triangle for each direction, with
 #' the best one in bold. Actions that are not directions are left out. Without a grid, each action
-#' has a symbol, or more than six actions have a row each, with a dot at the best one.
+#' has a row, with a dot at the best one.
 #'
 #' If all terminal states give the same reward, they are goals, unless going on gives more.
 #' Otherwise those with the largest reward are goals and the others are pits.
@@ -55,7 +55,7 @@ autoplot.gym_solution <- function(object, ..., type = c("values", "q"), columns 
   data <- solution_plot_data(object, columns, directions, passenger, destination, step)
   data$q <- q_of_cells(object$q, state_numbers(object$model$observation_space), data)
   picture <- if (is.null(data$columns)) {
-    if (type == "q") q_points(data) else value_points(data)
+    if (type == "q") q_cells(data) else value_points(data)
   } else {
     grid_picture(data, c(if (type == "q") q_layers(data) else value_layers(data), end_layers(data)))
   }
@@ -101,7 +101,8 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   )
   placed$cells$ink <- ink_on(placed$cells$value)
   placed$cells$text <- number_texts(placed$cells$value)
-  c(placed, list(directions = directions, numbers = numbers))
+  labels <- action_names(x$model$spec$id, length(numbers), numbers[[1L]])
+  c(placed, list(directions = directions, numbers = numbers, labels = labels))
 }
 
 #' Find the states that episodes go through and those in which they end
@@ -239,50 +240,35 @@ value_points <- function(data) {
   cells <- data$cells
   cells$value[cells$end != ""] <- 0
   cells$kind <- ifelse(cells$end == "", "value", cells$end)
-  marks <- c(list(value = key_mark("blue", shape = 16)), end_marks())
-  there <- marks[names(marks) %in% cells$kind[!is.na(cells$value)]]
-  cells$panel <- "value"
-  # With more states the names of actions would overlap.
-  crowded <- nrow(cells) > 30L
-  room <- c(-0.05, 0.1)
-  taken <- cells[crowded & !is.na(cells$value) & cells$end == "" & nzchar(cells$does), ]
+  cells$panel <- rep("value", nrow(cells))
+  taken <- cells[!is.na(cells$value) & cells$end == "" & nzchar(cells$does), ]
   taken$value <- taken$action
   taken$panel <- rep(action_panel(data), nrow(taken))
-  panels <- unique(c("value", taken$panel))
-  cells$panel <- factor(cells$panel, panels)
+  points <- rbind(cells, taken)
+  points <- points[!is.na(points$value), ]
+  panels <- unique(points$panel)
+  points$panel <- factor(points$panel, panels)
   taken$panel <- factor(taken$panel, panels)
-  ggplot2::ggplot(cells, ggplot2::aes(.data$state, .data$value)) +
+  marks <- c(list(value = key_mark("blue", shape = 16)), end_marks())
+  there <- marks[names(marks) %in% points$kind]
+  ggplot2::ggplot(points, ggplot2::aes(.data$state, .data$value)) +
     lapply(names(there), function(kind) {
       ggplot2::geom_point(
-        ggplot2::aes(colour = kind), cells[cells$kind == kind, ], shape = there[[kind]]$shape,
-        size = 2.5, na.rm = TRUE
-      )
-    }) +
-    (if (!crowded) {
-      ggplot2::geom_text(
-        ggplot2::aes(label = .data$does), cells[!is.na(cells$value), ], vjust = -0.9, size = 3
+        ggplot2::aes(colour = kind), points[points$kind == kind, ], shape = there[[kind]]$shape,
+        size = 2
       )
     }) +
     (if (nrow(taken)) {
       list(
-        ggplot2::geom_point(data = taken, colour = gym_colours[["blue"]], size = 1.5),
-        ggplot2::geom_blank(data = replace(taken[1:2, ], "value", range(data$numbers))),
         ggplot2::facet_wrap(
           ggplot2::vars(.data$panel), ncol = 1L, scales = "free_y", labeller = wrapped_strips(1)
-        )
+        ),
+        ggplot2::geom_blank(data = replace(taken[c(1L, 1L), ], "value", range(data$numbers)))
       )
     }) +
     key_of_marks(there) +
     ggplot2::scale_x_continuous(breaks = few_breaks) +
-    ggplot2::scale_y_continuous(
-      # Actions are whole numbers.
-      breaks = function(limits) {
-        ends <- range(data$numbers)
-        is_action <- nrow(taken) && isTRUE(all.equal(limits, ends + room * diff(ends)))
-        if (is_action) few_breaks(limits) else pretty(limits, 4)
-      },
-      expand = ggplot2::expansion(abs(room))
-    ) +
+    ggplot2::scale_y_continuous(breaks = few_breaks) +
     ggplot2::labs(x = "state", y = if (!nrow(taken)) "value") +
     theme_gym()
 }
@@ -293,39 +279,29 @@ action_panel <- function(data) {
   paste0("action", if (named) paste0(" (", toString(paste(data$numbers, data$directions)), ")"))
 }
 
-q_points <- function(data) {
-  labels <- unique(data$directions)
-  if (length(labels) > most_named_actions) {
-    return(q_of_many(data$q))
-  }
-  shapes <- stats::setNames(c(16L, 17L, 15L, 18L, 1L, 2L)[seq_along(labels)], labels)
-  ggplot2::ggplot(data$q, ggplot2::aes(.data$state, .data$q)) +
-    ggplot2::geom_point(
-      ggplot2::aes(
-        colour = factor(.data$direction, labels), shape = factor(.data$direction, labels)
-      ),
-      size = 2.5
-    ) +
-    ggplot2::scale_colour_manual(
-      name = "action", values = named_colours(labels), guide = rows_of_key(labels)
-    ) +
-    ggplot2::scale_shape_manual(name = "action", values = shapes, guide = rows_of_key(labels)) +
-    ggplot2::scale_x_continuous(breaks = few_breaks) +
-    ggplot2::labs(x = "state", y = "value of the action") +
-    theme_gym()
-}
-
-# Many actions have a row each, in the order of their numbers.
-q_of_many <- function(q) {
-  ggplot2::ggplot(q, ggplot2::aes(.data$state, .data$action)) +
+# The value of each action in each state: a row for each action.
+q_cells <- function(data) {
+  ggplot2::ggplot(data$q, ggplot2::aes(.data$state, .data$action)) +
     ggplot2::geom_tile(ggplot2::aes(fill = .data$q), width = 1, height = 1) +
     ggplot2::geom_point(
-      ggplot2::aes(colour = "best action"), q[q$best, ], shape = 21, fill = "white", size = 1.2
+      ggplot2::aes(colour = "best action"), data$q[data$q$best, ], shape = 21, fill = "white",
+      size = 1.2
     ) +
     value_fill() +
     key_of_marks(list(`best action` = key_mark("ink", shape = 21))) +
-    ggplot2::scale_x_continuous(breaks = few_breaks) +
-    ggplot2::scale_y_continuous(breaks = few_breaks) +
-    ggplot2::labs(x = "state", y = "action") +
-    theme_gym()
+    state_axes(data)
+}
+
+# States by actions. Few actions have their names on the axis.
+state_axes <- function(data) {
+  few <- length(data$numbers) <= most_named_actions
+  names <- ifelse(data$directions == data$numbers, data$labels, data$directions)
+  list(
+    ggplot2::scale_x_continuous(breaks = few_breaks),
+    ggplot2::scale_y_continuous(
+      breaks = if (few) data$numbers else few_breaks,
+      labels = if (few) broken_texts(names, 24) else ggplot2::waiver()
+    ),
+    ggplot2::labs(x = "state", y = "action"), theme_gym()
+  )
 }

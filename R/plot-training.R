@@ -102,3 +102,144 @@ placed_evaluations <- function(x) {
   earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
   evaluations[!earlier, ]
 }
+
+# Searches -----------------------------------------------------------------------------
+
+#' Plot a search
+#'
+#' Show every episode of a search as a point, the mean of each round as a line, and the target as a
+#' dashed line. Points of a round with almost the same return are side by side.
+#'
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object A search, as returned by [search_random()].
+#' @param type What to show: `"returns"`, the default; or `"network"`, the best policy, by
+#'   [plot.gym_policy_network()].
+#' @param main The title. `NULL`, the default, describes the search.
+#' @param ... Arguments of the network's picture. `plot()` passes its arguments to `autoplot()`.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` if no round was played to its end.
+#' @rdname plot.gym_search
+#' @exportS3Method ggplot2::autoplot
+#' @examplesIf gym:::can_start_server()
+#' search <- search_random("CartPole-v0", seed = 1)
+#' plot(search)
+#' plot(search, type = "network")
+autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
+  type <- check_choice(type[1L], c("returns", "network"), arg = "type")
+  if (type == "network") {
+    check_found(object)
+    return(autoplot.gym_policy_network(object$policy, ...))
+  }
+  check_dots_empty(...)
+  check_has_rounds(object)
+  means <- object$rounds
+  target <- finite_target(object$target)
+  ggplot2::ggplot(object$episodes, ggplot2::aes(.data$round, .data$return)) +
+    target_line(target) +
+    # With a seed of its own it leaves R's generator as it is.
+    ggplot2::geom_point(
+      ggplot2::aes(colour = "episode"), size = 1.8,
+      position = ggplot2::position_jitter(width = 0.25, height = 0, seed = 1)
+    ) +
+    # ggplot2 has a message for a line of one point.
+    (if (nrow(means) > 1L) ggplot2::geom_line(
+      ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means,
+      linewidth = 0.7
+    )) +
+    ggplot2::geom_point(
+      ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means, shape = 15
+    ) +
+    key_of_marks(c(
+      list(
+        episode = key_mark("sky", shape = 16),
+        `mean of the round` = key_mark("blue", shape = 15, line = "solid")
+      ),
+      target_mark(target)
+    )) +
+    ggplot2::scale_x_continuous(breaks = round_ticks(max(means$round))) +
+    picture_labels(
+      paste("Random search in", env_text(object)), search_outcome(object), x = "round", y = "return"
+    ) +
+    theme_gym()
+}
+
+check_has_rounds <- function(x, call = rlang::caller_env()) {
+  if (nrow(x$rounds) == 0L) {
+    gym_abort(
+      "There is nothing to plot: the search ended before its first round was played to its end.",
+      class = "gym_error_argument", argument = "x", value = x, call = call
+    )
+  }
+}
+
+search_outcome <- function(x) {
+  if (x$solved) {
+    paste("solved in round", x$round)
+  } else if (!is.null(x$target)) {
+    paste("not solved in", count_of(nrow(x$rounds), "round"))
+  }
+}
+
+# Bandits ------------------------------------------------------------------------------
+
+#' Plot what bandit learners achieved
+#'
+#' Show the mean reward of all learners, or the share that took the best arm, at each step. Several
+#' results are compared in one picture.
+#'
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object The result of [learn_bandit()].
+#' @param ... Further results, optionally with names for the key. `plot()` passes its arguments to
+#'   `autoplot()`.
+#' @param what What to show, a string: `"mean_reward"`, the default, or `"best_share"`.
+#' @param main The title. `NULL`, the default, names the bandit.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @rdname plot.gym_bandit_learning
+#' @exportS3Method ggplot2::autoplot
+#' @examples
+#' testbed <- bandit(arms = 10, horizon = 200)
+#' few <- learn_bandit(testbed, epsilon = 0.01, learners = 200, seed = 1)
+#' many <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
+#' plot(few, many, what = "best_share")
+autoplot.gym_bandit_learning <- function(object, ..., what = c("mean_reward", "best_share")) {
+  # Every result may have a name, the first one, too.
+  runs <- if (missing(object)) list(...) else list(object, ...)
+  what <- check_choice(what[1L], c("mean_reward", "best_share"), arg = "what")
+  curves <- bandit_curves(runs, what)
+  share <- what == "best_share"
+  ggplot2::ggplot(curves, ggplot2::aes(.data$step, .data$value, colour = .data$learner)) +
+    ggplot2::geom_line(linewidth = 0.5) +
+    ggplot2::scale_colour_manual(
+      name = NULL, values = named_colours(levels(curves$learner)),
+      guide = rows_of_key(levels(curves$learner), override.aes = list(linewidth = 1))
+    ) +
+    number_axis(ggplot2::scale_x_continuous) +
+    ggplot2::scale_y_continuous(limits = if (share) c(0, 1)) +
+    picture_labels(
+      runs[[1L]]$env_id, x = "step",
+      y = if (share) "share that takes the best arm" else "mean reward"
+    ) +
+    theme_gym()
+}
+
+bandit_curves <- function(runs, what, call = rlang::caller_env()) {
+  for (i in seq_along(runs)) {
+    if (!inherits(runs[[i]], "gym_bandit_learning")) {
+      abort_argument(runs[[i]], "what `learn_bandit()` returns", paste0("..", i), call)
+    }
+  }
+  given <- rlang::names2(runs)
+  labels <- vapply(runs, function(run) run$label, "")
+  labels <- make.unique(ifelse(nzchar(given), given, labels), sep = ", again ")
+  curves <- do.call(rbind, Map(function(run, label) {
+    data.frame(step = run$curve$step, value = run$curve[[what]], learner = label, row.names = NULL)
+  }, runs, labels))
+  curves$learner <- factor(curves$learner, unname(labels))
+  curves
+}

@@ -214,3 +214,81 @@ trainings_title <- function(trainings) {
   count <- if (inherits(x, "gym_trainings")) paste0(", ", count_of(length(x$trainings), "seed"))
   paste0(training_label(x), " in ", where, count)
 }
+
+# Sweeps -------------------------------------------------------------------------------
+
+#' @param object A sweep.
+#' @rdname sweep_agent
+#' @exportS3Method ggplot2::autoplot
+autoplot.gym_sweep <- function(object, ...) {
+  check_dots_empty(...)
+  trained <- Filter(Negate(is.null), object$trainings)
+  target <- common_target(trained)
+  picture <- trainings_picture(trained)
+  # The panels' titles replace the key, which would name the target.
+  dashed <- if (!is.null(target)) paste("dashed line:", target_label(target))
+  titles <- varied_settings(names(trained))
+  picture +
+    ggplot2::labs(
+      subtitle = paste(
+        broken_texts(c(picture$labels$subtitle, titles$constant, dashed), 54), collapse = "\n"
+      )
+    ) +
+    ggplot2::facet_wrap(
+      ggplot2::vars(.data$label), ncol = 2L, labeller = ggplot2::as_labeller(function(labels) {
+        broken_texts(titles$each[labels], 33)
+      })
+    ) +
+    theme_gym_panels() +
+    ggplot2::theme(legend.position = "none")
+}
+
+# Splits the names of settings, such as "step_size = 0.1, noise = 0.05", into what they share and
+# the rest, which the panels' titles need not repeat.
+varied_settings <- function(names) {
+  parts <- strsplit(names, ", ", fixed = TRUE)
+  shared <- if (length(names) > 1L) Reduce(intersect, parts)
+  each <- vapply(parts, function(part) paste(setdiff(part, shared), collapse = ", "), "")
+  list(
+    constant = if (length(shared)) paste(shared, collapse = ", "),
+    each = stats::setNames(ifelse(nzchar(each), each, names), names)
+  )
+}
+
+# Diagnostics --------------------------------------------------------------------------
+
+# The numbers that an agent logs about its learning, which show why it does not learn: a panel for
+# each number over the steps of the training.
+
+diagnostics_picture <- function(x, call = rlang::caller_env()) {
+  names <- names(agent_log(x$agent))
+  if (!length(names)) {
+    gym_abort(
+      c(paste0("The training has no diagnostics: ", training_label(x), " logs none."),
+        i = "`agent_ppo()` and other agents with a method of `agent_log()` do."),
+      class = "gym_error_argument", argument = "type", value = "diagnostics", call = call
+    )
+  }
+  rows <- do.call(rbind, lapply(names, function(name) {
+    data.frame(steps = x$history$steps, name = name, value = x$history[[name]])
+  }))
+  rows$name <- factor(rows$name, names)
+  # Random episodes, which only supplied the first moments of observations, taught nothing.
+  rows <- rows[is.finite(rows$value), ]
+  # A number that stays the same would lie on an axis from half below it to half above it, where
+  # that of a small one seems to be 0.
+  spread <- stats::ave(rows$value, as.character(rows$name), FUN = function(x) diff(range(x)))
+  constant <- rows[spread == 0, ]
+  ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +
+    ggplot2::geom_blank(ggplot2::aes(y = 0.5 * .data$value), constant) +
+    ggplot2::geom_blank(ggplot2::aes(y = 1.5 * .data$value), constant) +
+    ggplot2::geom_line(colour = gym_colours[["blue"]], linewidth = 0.6) +
+    ggplot2::geom_point(colour = gym_colours[["blue"]], size = 0.6) +
+    ggplot2::facet_wrap(ggplot2::vars(.data$name), scales = "free_y", ncol = 2L) +
+    number_axis(ggplot2::scale_x_continuous, limits = c(0, NA), n.breaks = 4) +
+    number_axis(
+      ggplot2::scale_y_continuous, n.breaks = 4, guide = ggplot2::guide_axis(check.overlap = TRUE)
+    ) +
+    picture_labels(trainings_title(list(x)), x = training_steps_label, y = NULL) +
+    theme_gym_panels()
+}

@@ -194,9 +194,9 @@ check_draws_known <- function(policy, call = rlang::caller_env()) {
   check_is_network(policy, call)
   if (!has_log_prob(policy)) {
     gym_abort(
-      c(paste0("Actions have a probability where a network draws them by it, not in ",
+      c(paste0("Only a network that draws its actions knows their probabilities, not ",
                policy_text(policy), "."),
-        i = "`policy_network(output = \"softmax\")` and `output = \"gaussian\"` do."),
+        i = "`policy_network()` with `output = \"softmax\"` or `\"gaussian\"` makes one."),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
   }

@@ -180,7 +180,7 @@ check_draws_from_sums <- function(output, activation, call = rlang::caller_env()
   last <- activation[[length(activation)]]
   if (!identical(output, "greedy") && last != "identity") {
     gym_abort(
-      c(paste0("Outputs that actions are drawn from are those of \"identity\", not of \"", last,
+      c(paste0("A network that draws its actions needs outputs of \"identity\", not of \"", last,
                "\"."),
         i = "`activation = c(\"tanh\", \"identity\")` has them."),
       class = "gym_error_argument", argument = "activation", value = activation, call = call

@@ -137,32 +137,6 @@ row_probabilities <- function(policy, rows) {
   p
 }
 
-softmax_rows <- function(values, temperature = 1) {
-  weight <- exp((values - row_max(values)) / temperature)
-  weight / rowSums(weight)
-}
-
-# Draws a column for each row of a matrix of probabilities.
-draw_by_row <- function(p) {
-  u <- stats::runif(nrow(p))
-  choice <- rep(1L, nrow(p))
-  below <- numeric(nrow(p))
-  last <- max.col(p > 0, "last")
-  for (column in seq_len(ncol(p) - 1L)) {
-    below <- below + p[, column]
-    choice <- choice + (u >= below)
-  }
-  # The sum of the probabilities may be a little below 1.
-  pmin(choice, last)
-}
-
-# The largest number in each row and its column, the first of several. An episode asks about a
-# single row in each step.
-row_max <- function(x) {
-  if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
-}
-best_column <- function(x) if (nrow(x) == 1L) which.max(x) else max.col(x, "first")
-
 #' @exportS3Method
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {
   env <- one_sub_env(env)

@@ -261,10 +261,13 @@ training_job <- function(given, kwargs, client, call) {
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
   settings$model <- if (online) judging_model(settings, client)
   settings["eval_steps"] <- list(steps_between_evaluations(settings$model, settings$max_steps))
-  if (samples_model(settings, wants_random_map(env, kwargs))) {
-    settings$sampled <- model_to_sample(settings, call)
+  # `learn_q("Taxi-v4")` is `learn_q(env_model("Taxi-v4"))`.
+  settings$from_model <- samples_model(settings, wants_random_map(env, kwargs))
+  settings$played <- if (settings$from_model) {
+    list(env = model_to_sample(settings, call))
+  } else {
+    settings[c("env", "kwargs")]
   }
-  settings$from_model <- !is.null(settings$sampled)
   if (!is.null(run)) run$settings <- settings
   list(
     settings = settings, files = files, seeds = seeds, run = run,
@@ -284,17 +287,17 @@ with_training_env <- function(settings, play, max_steps, client, call) {
     candidates <- iteration_candidates(settings$agent)
     max(settings$eval_episodes, candidates * settings$episodes, least_sub_envs)
   }
-  played <- settings$sampled %||% settings$env
-  kwargs <- if (is.null(settings$sampled)) settings$kwargs
+  played <- settings$played
   evaluated <- NULL
   on.exit(if (!is.null(evaluated)) evaluated$close(wait = FALSE))
   play_both <- function(vector_env) {
-    if (calls_r(played) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
+    if (calls_r(played$env) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
       # The learner plays alone, its evaluations need not.
       vector_env$make_evaluated <- function() {
         if (is.null(evaluated)) {
           evaluated <<- rlang::exec(
-            as_vector_env, played, !!!kwargs, max_envs = episodes, client = vector_env$client
+            as_vector_env, played$env, !!!played$kwargs, max_envs = episodes,
+            client = vector_env$client
           )
           evaluated$call <<- call
         }
@@ -305,8 +308,9 @@ with_training_env <- function(settings, play, max_steps, client, call) {
   }
   # Unlike exec(), inject() leaves `client` unevaluated.
   rlang::inject(with_vector_env(
-    env = played, episodes = episodes, play = play_both, max_steps = max_steps, !!!kwargs,
-    num_envs = settings$num_envs, num_workers = settings$num_workers, client = client, call = call
+    env = played$env, episodes = episodes, play = play_both, max_steps = max_steps,
+    !!!played$kwargs, num_envs = settings$num_envs, num_workers = settings$num_workers,
+    client = client, call = call
   ))
 }
 

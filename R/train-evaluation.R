@@ -92,7 +92,7 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
   final <- kind == "final"
   last <- utils::tail(state$evaluations, 1L)
   row <- if (length(last) && is_exact(last[[1L]]) && last[[1L]]$iteration == state$iteration) {
-    # The policy is still the same, and so is its value.
+    # The policy has not changed since that evaluation, so its value is the same.
     replace(last[[1L]], "kind", kind)
   } else {
     exact <- if (!is.null(settings$model)) {

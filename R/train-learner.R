@@ -118,7 +118,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
     vector_env <- with_masks(vector_env, agent$mask, note, call)
   }
   played <- if (vector_env$num_envs == 1L) {
-    if (is.null(settings$sampled) && plan_kind() != "none") inform_learner_plays_here()
+    if (is.null(vector_env$model) && plan_kind() != "none") inform_learner_plays_here()
     learn_alone(learner, state, vector_env, settings, call)
   } else {
     playing <- side_by_side(learner, agent, call)
@@ -218,21 +218,11 @@ judging_model <- function(settings, client) {
 known_model <- function(settings, client) {
   env <- settings$env
   if (inherits(env, c("gym_model", "gym_r_env"))) {
-    return(model_or_null(env_model(env)))
-  }
-  if (!rlang::is_string(env)) {
-    return(NULL)
-  }
-  if (is_registered(env)) {
-    model_or_null(rlang::exec("env_model", env, !!!settings$kwargs))
-  } else if (grepl(modelled_ids, env)) {
-    # The server is asked once per environment.
-    known <- known_of_env(client, env, settings$kwargs)
-    known$model <- known$model %||% list(model_or_null(
-      rlang::exec("env_model", env, !!!settings$kwargs, client = client)
-    ))
-    model <- known$model[[1L]]
-    if (!is.null(model)) model$versions <- server_versions(client)
+    model_or_null(env_model(env))
+  } else if (rlang::is_string(env) && (is_registered(env) || grepl(modelled_ids, env))) {
+    # inject() leaves `client` unevaluated, which an environment in R does not need.
+    model <- model_or_null(rlang::inject(env_model(env, !!!settings$kwargs, client = client)))
+    if (!is.null(model) && !is_registered(env)) model$versions <- server_versions(client)
     model
   }
 }

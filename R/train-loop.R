@@ -112,8 +112,8 @@ train_iteration <- function(state, vector_env, settings, call) {
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 
-# What plays an iteration: candidates, networks with the weights that the agent asks for; or the
-# behavior policy itself if it has no weights.
+# The candidates of an iteration: networks with the weights that the agent asks for, or its behavior
+# policy if that has no weights.
 asked_candidates <- function(state, agent, call) {
   # A behavior policy may be drawn.
   policy <- with_generator(state$streams$agent, agent_behavior(agent))

@@ -29,12 +29,6 @@
 #'   (seconds, a double), `interrupted` (logical).
 #'
 #'   `coef()` returns the weights of the policies, a matrix with a row for each seed.
-#'
-#'   `summary()` returns an object of class `summary.gym_trainings`, a list of `trainings`,
-#'   `finished`, `stopped_early` and `reached` (their numbers, integers), `lower` and `upper` (the
-#'   95% interval of the share that reaches the target, doubles), `returns` and `steps` (quartiles
-#'   and mean of the final mean returns and of the steps of the training, named numeric vectors of
-#'   length 6).
 #' @references E. B. Wilson (1927), Probable inference, the law of succession, and statistical
 #'   inference, Journal of the American Statistical Association 22, 209-212.
 #' @seealso [train_agent()], [plot()][plot.gym_trainings()]
@@ -88,19 +82,7 @@ coef.gym_trainings <- function(object, ...) {
 
 #' @rdname gym_trainings
 #' @export
-summary.gym_trainings <- function(object, ...) {
-  table <- as.data.frame(object)
-  done <- table[!table$interrupted, ]
-  interval <- wilson_interval(sum(done$reached), nrow(done))
-  structure(
-    list(
-      trainings = object, finished = nrow(done), stopped_early = sum(done$stopped_early),
-      reached = sum(done$reached), lower = interval[[1L]], upper = interval[[2L]],
-      returns = quartiles(stats::na.omit(done$mean_return)), steps = quartiles(done$steps)
-    ),
-    class = "summary.gym_trainings"
-  )
-}
+summary.gym_trainings <- function(object, ...) object
 
 #' Compute Wilson's score interval of a share
 #' @noRd
@@ -152,16 +134,4 @@ reached_lines <- function(done, target) {
            interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")"),
     paste0("Stopped early: ", sum(done$stopped_early), " of ", n)
   )
-}
-
-#' @export
-print.summary.gym_trainings <- function(x, ...) {
-  print(x$trainings)
-  if (x$finished > 0L) {
-    cat("\n")
-    # Searches have no final evaluations.
-    returns <- if (!anyNA(x$returns)) x$returns
-    print(signif(rbind(`mean return` = returns, steps = x$steps), 4L))
-  }
-  invisible(x)
 }

@@ -137,10 +137,7 @@ seeds_go_to_workers <- function(vector_env, settings) {
 # whole training.
 training_recipe <- function(vector_env, settings) {
   vector_env$remembers <- NULL
-  sampled <- settings$sampled
-  environment_recipe(
-    sampled %||% settings$env, vector_env, if (is.null(sampled)) settings$kwargs else list()
-  )
+  environment_recipe(settings$played$env, vector_env, settings$played$kwargs %||% list())
 }
 
 # If parallel trainings have their own workers on this machine, too.

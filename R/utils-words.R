@@ -19,7 +19,7 @@ marked_text <- function(x, ...) {
   }
 }
 
-# One by one: together they would all get as many decimals as the longest needs.
+# Each number by itself: together all would get as many decimals as the longest one needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
 
 percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")

@@ -28,6 +28,5 @@ trained <- train_agent(
   checkpoint = file.path(folder, "acrobot.rds"), log = file.path(folder, "acrobot")
 )
 print(trained)
-print(summary(trained))
 
 future::plan("sequential")

@@ -99,6 +99,7 @@ test_that("without a preset agents have their own defaults, and training needs a
   for (search in list(search_ars, search_cem, search_hill_climb)) {
     expect_error(search(env), "needs a budget", class = "gym_error_argument")
   }
+  expect_error(search_ars(env, NULL, 20), "need names", class = "gym_error_argument")
   expect_error(search_ars(env, directions = 0, iterations = 1), class = "gym_error_argument")
   expect_error(search_ars(env, directions = numeric(), iterations = 1),
                class = "gym_error_argument")

@@ -65,8 +65,8 @@ test_that("Q-values are triangles at the side to which an action leads, the best
                sort(unique(round(apply(solved$q[reached, ], 1, max), 2))))
   # Where one action is best, to the right of the middle of its cell.
   expect_gt(best$x[round(best$x) == 2], 2)
-  points <- drawn(autoplot(solved, type = "q"))
-  expect_length(unique(layers_of(points, "GeomPoint")[[1]]$shape), 2)
+  rows <- drawn(autoplot(solved, type = "q"))
+  expect_identical(unique(layers_of(rows, "GeomTile")[[1]]$y), c(0, 1))
 })
 
 test_that("an end that costs is a pit, alone it is one where going on gives more", {
@@ -82,7 +82,7 @@ test_that("an end that costs is a pit, alone it is one where going on gives more
   expect_identical(ends(-9, -9, move = 1), c("pit", "", "", "pit"))
 })
 
-test_that("without a grid the actions of many states have a panel, and many actions a row each", {
+test_that("without a grid the actions have a panel, and a row each", {
   # The gambler of Sutton and Barto (2018), example 4.3: stakes of up to half of the goal.
   states <- data.frame(state = rep(1:39, pmin(1:39, 39:1)))
   states$action <- sequence(pmin(1:39, 39:1))

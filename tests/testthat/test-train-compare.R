@@ -227,7 +227,7 @@ test_that("a run whose last stopping evaluation was lucky has not reached the ta
                          seeds = 1:5, target = 20, eval_episodes = 4)
   compared <- compare_trainings(trained)
   expect_identical(compared$table$reached, 0L)
-  expect_identical(compared$table$reached, summary(trained)$reached)
+  expect_identical(compared$table$reached, sum(as.data.frame(trained)$reached))
 })
 
 test_that("what is no training is named, with what it was meant to be", {

@@ -41,30 +41,6 @@ test_that("a model without a limit asks for one", {
   expect_false(from_model("CliffWalking-v1", model = FALSE))
 })
 
-test_that("the model is asked for once, and anew for other arguments, limits or versions", {
-  client <- test_client()
-  asked <- 0
-  ask <- env_model
-  local_functions(env_model = function(...) {
-    asked <<- asked + 1
-    ask(...)
-  })
-  quiet <- function(...) suppressMessages(learn("FrozenLake-v1", ...))
-  quiet(success_rate = 0.7)
-  quiet(success_rate = 0.7)
-  expect_identical(asked, 1)
-  short <- quiet(success_rate = 0.7, max_episode_steps = 3)
-  expect_identical(asked, 2)
-  expect_lte(max(short$history$mean_length), 3)
-  # Another server may have another table.
-  state <- client_state(client)
-  health <- state$health
-  withr::defer(state$health <- health)
-  state$health[[1L]]$versions$gymnasium <- "0.1"
-  quiet(success_rate = 0.7)
-  expect_identical(asked, 3)
-})
-
 # Plays a model at random in the learners' loop: the steps, and the returns of episodes.
 played_from_model <- function(model, episodes, limit) {
   draws <- uniform_draws()
@@ -72,7 +48,7 @@ played_from_model <- function(model, episodes, limit) {
   steps <- list()
   act <- function() as.integer(draws$draw() * actions) + 1L
   learner <- list(
-    begin = function(x, sub_env, observation) act(),
+    act = function(x, sub_env, observation) act(),
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       steps[[length(steps) + 1L]] <<- c(x, column, after, reward, terminated)
       act()
