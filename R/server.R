@@ -207,7 +207,8 @@ gym_server_stop <- function(client = NULL) {
 #' Read a server's log
 #'
 #' Return the warnings and errors of a server that this session started, and the output of its
-#' environments. This also works after its end. The same warning is logged once a minute.
+#' environments. This also works after its end. The same warning, or error of an environment, is
+#' logged once.
 #'
 #' @inheritParams gym_server_stop
 #' @return A character vector with an element for each line; `character(0)` if there is no output.

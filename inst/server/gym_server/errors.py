@@ -9,6 +9,7 @@ import traceback
 from werkzeug.exceptions import HTTPException
 
 from gym_server.json_values import LONGEST_MESSAGE, brief, shortened
+from gym_server.logs import warn_once
 
 log = logging.getLogger(__name__)
 
@@ -47,6 +48,9 @@ _HEADERS = {
 _AFTER_SOMETHING_WAS_DONE = frozenset(
     {"missing_dependency", "monitor_directory", "too_much_memory"}
 )
+
+# In the log, in characters: an error may repeat everything that a client sent.
+_LONGEST_TRACEBACK = 20_000
 
 # For people: describes the routes. The classic R client shows no error message without this field.
 _DOCUMENTATION = "https://github.com/openai/gym-http-api#api-specification"
@@ -240,7 +244,8 @@ def logged(error: BaseException) -> GymServerError:
             "this is a bug in gym_server; the server's log has the details",
         )
     elif error.code in ("environment_error", "too_much_memory") and not error.is_logged:
-        log.warning("%s", error.message, exc_info=error)
+        trace = "".join(traceback.format_exception(error)).rstrip()
+        warn_once(__name__, shortened(f"{error.message}\n{trace}", _LONGEST_TRACEBACK))
     return error
 
 

@@ -15,3 +15,19 @@ def test_a_warning_is_logged_once(caplog):
         logs._show_warning(text, UserWarning, "env.py", 1)
     said = [record.getMessage() for record in caplog.records]
     assert said == ["env.py:1: UserWarning: after the end", "env.py:1: UserWarning: another"]
+
+
+def test_the_error_of_an_environment_is_logged_once_with_its_traceback(caplog):
+    def fail():
+        raise RuntimeError("out of paint")
+
+    for _ in range(2):
+        try:
+            fail()
+        except RuntimeError as error:
+            refusal = environment_error(error)
+            refusal.__cause__ = error
+        answer_to(refusal)
+    (record,) = caplog.records
+    assert record.message.startswith("The environment raised RuntimeError: out of paint\nTraceback")
+    assert "in fail" in record.message

@@ -224,13 +224,16 @@ def take_directory(
 
 
 def _empty_those_of_gone_monitors(path: Path) -> None:
-    for name in filter(_INSTANCE_ID.fullmatch, os.listdir(path)):
-        other = MonitorDirectory(path / name)
-        if other.is_free:
+    for table in path.glob(f"*/{TABLE}"):
+        if _INSTANCE_ID.fullmatch(table.parent.name):
+            other = MonitorDirectory(table.parent)
+            if not other.is_free:
+                other.table.close()
+                continue
             other.empty()
-        other.leave()
-        with contextlib.suppress(OSError):
-            other.path.rmdir()
+            other.leave()
+            with contextlib.suppress(OSError):
+                other.path.rmdir()
 
 
 def _refuse(directory: object, reason: str, hint: str | None = None) -> GymServerError:
