@@ -9,7 +9,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 log = logging.getLogger(__name__)
@@ -142,17 +142,16 @@ def is_short() -> bool:
     return _limits is not None and _taken() > _limits[0] // 2
 
 
-def start(thread: threading.Thread) -> None:
-    """Start a thread, with memory that is kept for this.
+@contextlib.contextmanager
+def for_threads() -> Iterator[None]:
+    """Start threads meanwhile, with memory that is kept for this.
 
     A thread that finds no memory for its first call never tells so, and Python's ``start()`` waits
-    for it for ever (https://github.com/python/cpython/issues/140746).
-
-    Raises:
-        RuntimeError: there is no memory for its stack.
+    for it for ever (https://github.com/python/cpython/issues/140746). If there is no memory for its
+    stack, ``start()`` raises RuntimeError.
     """
     if _limits is None:
-        thread.start()
+        yield
         return
     import resource
 
@@ -160,6 +159,6 @@ def start(thread: threading.Thread) -> None:
     with _starting:
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
         try:
-            thread.start()
+            yield
         finally:
             resource.setrlimit(resource.RLIMIT_DATA, (size, most))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -90,27 +90,20 @@ def _query_integer(value: object) -> int:
     return int(value)
 
 
-def _one_of(names: Mapping[str, Any]) -> Callable[[object], Any]:
-    by_letters = {_letters(name): meaning for name, meaning in names.items()}
-
-    def parse(value: object) -> Any:
-        meaning = by_letters.get(_letters(text(value)))
-        if meaning is None:
-            raise ValueError
-        return meaning
-
-    return parse
-
-
 def _letters(name: str) -> str:
     return name.lower().replace("_", "")
 
 
 def _named(names: Mapping[str, Any]) -> Kind:
     """Create a field that accepts some names, ignoring case and underscores."""
-    written = [f'"{name}"' for name in names]
-    wanted = f"{', '.join(written[:-1])} or {written[-1]}"
-    return Kind(wanted, _one_of(names))
+    by_letters = {_letters(name): meaning for name, meaning in names.items()}
+
+    def parse(value: object) -> Any:
+        if _letters(text(value)) not in by_letters:
+            raise ValueError
+        return by_letters[_letters(text(value))]
+
+    return Kind(f"one of {', '.join(names)}", parse)
 
 
 ANY_ID = Kind("a string", lambda value: value)

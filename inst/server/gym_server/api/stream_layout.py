@@ -190,10 +190,8 @@ class StreamLayout:
 def _fits_float64(space: Space) -> bool:
     """Return whether float64 can represent the numbers of all members."""
     match space:
-        case Tuple():
-            return all(map(_fits_float64, space.spaces))
-        case Dict():
-            return all(map(_fits_float64, space.spaces.values()))
+        case Tuple() | Dict():
+            return all(map(_fits_float64, spaces.parts_of(space)))
         case Discrete():
             return abs(int(space.start)) + int(space.n) <= 2**53
         case _:

@@ -153,7 +153,8 @@ class Server:
         # A daemon thread, so that a call that never returns does not keep the process alive.
         thread = threading.Thread(target=self._serve, args=(connection,), daemon=True)
         try:
-            memory.start(thread)
+            with memory.for_threads():
+                thread.start()
         except RuntimeError:
             client.close()
             self._remove(connection)

@@ -204,7 +204,8 @@ class InstanceManager:
                 log.warning("Closing instance %s: %s", instance.instance_id, error)
 
         closer = threading.Thread(target=close, daemon=True)
-        memory.start(closer)
+        with memory.for_threads():
+            closer.start()
         return closer
 
     def _all(self) -> tuple[Instance, ...]:

@@ -182,7 +182,8 @@ class Rollouts:
                 target=self._run, args=(player,), name="rollouts", daemon=True
             )
             try:
-                memory.start(thread)
+                with memory.for_threads():
+                    thread.start()
             except RuntimeError as error:
                 # There is no memory for its stack. If there are other players, they do the work.
                 for request in [] if self._players else list(self._requests):

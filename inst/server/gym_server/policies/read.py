@@ -144,14 +144,6 @@ class PolicyList(Policy):
             return together
 
         of_rows = Actor(act, *actors.values())
-        clips = {one: actor.clip for one, actor in actors.items() if actor.clip is not None}
-        if clips:
-            of_rows.clip = lambda action: _clip_rows(action, candidate, clips)
+        # Actions of the others are within the bounds.
+        of_rows.clip = next((one.clip for one in actors.values() if one.clip is not None), None)
         return of_rows
-
-
-def _clip_rows(action: Any, candidate: np.ndarray, clips: dict[int, Callable[[Any], Any]]) -> Any:
-    clipped = np.array(action)
-    for one, clip in clips.items():
-        clipped[candidate == one] = clip(action[candidate == one])
-    return clipped

@@ -55,7 +55,7 @@ def _set_up() -> None:
     for name in ("SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    start.exit_with_parent(group=True)
+    start.end_group_with_parent()
     logs.set_up(" (process %(process)d)")
     with contextlib.suppress(OSError, ValueError, AttributeError):
         # Print where C code crashed.

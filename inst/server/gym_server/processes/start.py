@@ -65,23 +65,18 @@ def remove_temporary_folder() -> None:
         shutil.rmtree(_temporary_folder(), ignore_errors=True)
 
 
-def exit_with_parent(group: bool = False) -> None:
-    """Make this process exit when its parent ends, however it ends.
-
-    Args:
-        group: whether to kill all other processes of its group, too.
-    """
+def end_group_with_parent() -> None:
+    """Make this process and all others of its group end when its parent ends, however it ends."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
-    if group and sys.platform == "linux":
+    if sys.platform == "linux":
         _kill_group_at_end_of(parent.sentinel)
 
     def exit_after_parent() -> None:
         parent.join()
-        if group:
-            with contextlib.suppress(OSError, AttributeError):
-                os.killpg(os.getpid(), signal.SIGKILL)
+        with contextlib.suppress(OSError, AttributeError):
+            os.killpg(os.getpid(), signal.SIGKILL)
         os._exit(1)
 
     threading.Thread(target=exit_after_parent, daemon=True).start()

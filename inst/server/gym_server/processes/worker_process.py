@@ -97,7 +97,8 @@ class WorkerProcess:
         try:
             self._process.start()
             self.pid = cast(int, self._process.pid)
-            memory.start(threading.Thread(target=self._await_end, daemon=True))
+            with memory.for_threads():
+                threading.Thread(target=self._await_end, daemon=True).start()
             _alive.add(self)
         except BaseException:
             self._send_kill()

@@ -7,11 +7,10 @@ drawing, and closing of what was drawn, runs here, and pygame ends with the proc
 
 from __future__ import annotations
 
-import queue
 import sys
-import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import ThreadPoolExecutor
+from threading import get_ident
 from typing import TypeVar
 
 from gym_server import memory
@@ -20,49 +19,26 @@ from gym_server.threads import calls
 ResultT = TypeVar("ResultT")
 
 
-class _Job:
-    """One piece of work for the render thread.
-
-    Attributes:
-        draw: the function to run.
-        describe: describes the call that it belongs to.
-        future: its result.
-    """
-
-    def __init__(self, draw: Callable[[], object], describe: Callable[[], str]) -> None:
-        self.draw = draw
-        self.describe = describe
-        self.future: Future = Future()
-
-
 class RenderThread:
     """Runs drawing and closing functions one after another."""
 
     def __init__(self) -> None:
         """Start no thread yet: a server that never draws needs none."""
-        self._lock = threading.Lock()
-        self._queue: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
-        self._thread: threading.Thread | None = None
-        self._stopped = False
+        self._executor = ThreadPoolExecutor(1, "render", self._note_thread)
+        self._thread = 0
+
+    def _note_thread(self) -> None:
+        self._thread = get_ident()
 
     def run(self, draw: Callable[..., ResultT], *args: object) -> ResultT:
         """Run a function on the render thread; return its result or raise its exception."""
-        if threading.current_thread() is self._thread:
+        if get_ident() == self._thread:
             # Drawing may call for drawing, for example in a monitored environment.
             return draw(*args)
         with calls.waiting() as describe:
-            job = _Job(lambda: _keep_pygame_and(draw, *args), describe or (lambda: "Drawing"))
-            with self._lock:
-                if self._stopped:
-                    raise RuntimeError("nothing is drawn any more")
-                if self._thread is None:
-                    # A daemon, so that drawing that never ends does not keep the process alive.
-                    thread = threading.Thread(target=self._work, name="render", daemon=True)
-                    memory.start(thread)
-                    self._thread = thread
-                self._queue.put(job)
-            result: ResultT = job.future.result()
-            return result
+            with memory.for_threads():
+                future = self._executor.submit(_do, describe or (lambda: "Drawing"), draw, *args)
+            return future.result()
 
     def close(self, close: Callable[[], object], drawn: bool) -> None:
         """Close an environment: on the render thread if it has drawn, else in this thread."""
@@ -71,29 +47,14 @@ class RenderThread:
         else:
             _keep_pygame_and(close)
 
-    def _work(self) -> None:
-        while (job := self._queue.get()) is not None:
-            with calls.call(job.describe):
-                _do(job)
-            # Do not keep the picture until the next job comes.
-            job = None
-
     def stop(self) -> None:
-        """Finish the queued jobs, and end the thread."""
-        with self._lock:
-            self._stopped = True
-            self._queue.put(None)
-        if self._thread is not None:
-            self._thread.join()
+        """Finish the queued functions, and end the thread."""
+        self._executor.shutdown()
 
 
-def _do(job: _Job) -> None:
-    try:
-        result = job.draw()
-    except BaseException as error:
-        job.future.set_exception(error)
-    else:
-        job.future.set_result(result)
+def _do(describe: Callable[[], str], draw: Callable[..., ResultT], *args: object) -> ResultT:
+    with calls.call(describe):
+        return _keep_pygame_and(draw, *args)
 
 
 def _keep_pygame_and(draw: Callable[..., ResultT], *args: object) -> ResultT:

@@ -40,13 +40,9 @@ def check_keep(keep: Keep, observation_space: Space, action_space: Space) -> Non
 
 
 def _has_arrays(space: Space) -> bool:
-    match space:
-        case Tuple():
-            return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces))
-        case Dict():
-            return len(space.spaces) > 0 and all(map(_has_arrays, space.spaces.values()))
-        case _:
-            return isinstance(space, ARRAYS)
+    if isinstance(space, (Tuple, Dict)):
+        return len(space.spaces) > 0 and all(map(_has_arrays, parts_of(space)))
+    return isinstance(space, ARRAYS)
 
 
 def _bytes_of(space: Space) -> int:
