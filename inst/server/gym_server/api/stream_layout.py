@@ -69,6 +69,10 @@ class ArrayLayout:
         self.size = max((entry["data_offsets"][1] for entry in self.table.values()), default=0)
         self.padded_size = max(_FEWEST_BYTES, self.size + -self.size % 8)
         entries = self.table.values()
+        self._places = [
+            (name, entry["dtype"], entry["shape"], *entry["data_offsets"])
+            for name, entry in self.table.items()
+        ]
         # One assignment to a field converts, copies and places an array.
         self._record = np.dtype(
             {
@@ -89,8 +93,8 @@ class ArrayLayout:
             raise malformed_message(f"its arrays have {len(data)} bytes, not {self.size}")
         view = memoryview(data)
         tensors = {
-            name: Tensor(entry["dtype"], entry["shape"], view[slice(*entry["data_offsets"])])
-            for name, entry in self.table.items()
+            name: Tensor(dtype, shape, view[begin:end])
+            for name, dtype, shape, begin, end in self._places
         }
         try:
             check_booleans(tensors)

@@ -73,6 +73,15 @@ def test_discrete_sub_envs_may_be_32_or_64_bits_wide(dtype):
     assert (batch.dtype, batch.tolist()) == (np.int8, [0, 2])
 
 
+@pytest.mark.parametrize("action", [-1, 3])
+@pytest.mark.parametrize("rows", [None, 1, 2])
+def test_actions_out_of_bounds_are_refused_however_many_they_are(action, rows):
+    array = np.array(action) if rows is None else np.array([0, action])[-rows:]
+    read = spaces.tensor_reader(Discrete(3), "action")
+    with pytest.raises(NotInSpace, match=f"^{action} "):
+        read(Parts({"action": Tensor.of(array)}), spaces.Rows(rows, ""))
+
+
 def test_unsigned_discrete_sub_envs_are_unsigned():
     space = Discrete(3, dtype=np.uint64)
     parts = spaces.tensor_writer(space, "action", is_batch=True)(np.array([0, 2], np.uint64))
