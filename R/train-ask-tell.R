@@ -39,9 +39,9 @@
 #'   `"moments"` if its policy has `normalize = TRUE`.
 #' * `agent_policy()`: the policy with the agent's current weights, which need not be those of the
 #'   best candidate. The method of `"gym_agent"` returns `agent$policy`.
-#' * `agent_behavior()`: the policy whose candidates are played. The method of `"gym_agent"` returns
-#'   `agent_policy(agent)`. If it is not a network (a [policy_random()], for example), it is played
-#'   itself, and `agent_ask()` is not called.
+#' * `agent_behavior()`: the policy whose candidates are played; a method may draw it. The method of
+#'   `"gym_agent"` returns `agent_policy(agent)`. If it is not a network (a [policy_random()], for
+#'   example), it is played itself, and `agent_ask()` is not called.
 #' * `agent_episodes()`: the number of episodes of each candidate in this iteration. The method of
 #'   `"gym_agent"` returns `episodes`, the argument of [train_agent()].
 #' * `agent_log()`: numbers about the last iteration for the history and the log, a numeric vector

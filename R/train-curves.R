@@ -112,3 +112,204 @@ curve_rows <- function(x, label, call) {
     abort_argument(x, must, if (nzchar(label)) label else "...", call)
   }
 }
+
+# From files of logs --------------------------------------------------------------------
+
+# Learning curves from log files: our own, Stable-Baselines3's and CleanRL's.
+
+read_curves <- function(path, call) {
+  if (!file.exists(path)) {
+    gym_abort(paste0("There is no file or folder \"", path, "\"."), class = "gym_error_argument",
+              argument = "...", value = path, call = call)
+  }
+  rows <- read_logs(path, call)[[1L]]
+  if (is.null(rows)) {
+    gym_abort(
+      c(paste0("\"", path, "\" has no log of a training."),
+        i = paste("A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of",
+                  "Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`."),
+        i = if (endsWith(path, ".rds")) "A result that `readRDS()` returns is an argument, too."),
+      class = "gym_error_argument", argument = "...", value = path, call = call
+    )
+  }
+  # Runs with unknown seeds are numbered.
+  unknown <- is.na(rows$seed)
+  rows$seed[unknown] <- match(rows$run[unknown], unique(rows$run))
+  rows[names(no_curve)]
+}
+
+#' Read files or folders, each by itself
+#'
+#' A crash may leave a damaged file, which must not hide the others: it is warned of. If all are
+#' damaged, the first one is an error.
+#' @return A list of what `read` returned for those that are not damaged.
+#' @noRd
+read_logs <- function(paths, call, read = function(path) path_curves(path, call)) {
+  each <- lapply(paths, function(path) {
+    tryCatch(
+      tryCatch(read(path), error = function(cnd) abort_damaged(path, cnd, call)),
+      gym_error_argument = identity
+    )
+  })
+  damaged <- vapply(each, inherits, NA, "gym_error_argument")
+  if (length(each) && all(damaged)) rlang::cnd_signal(each[[1L]])
+  for (cnd in each[damaged]) {
+    rlang::warn(c(conditionMessage(cnd), i = "It is left out."), class = "gym_warning_log")
+  }
+  each[!damaged]
+}
+
+abort_damaged <- function(path, cnd, call) {
+  if (inherits(cnd, "gym_error_argument")) rlang::cnd_signal(cnd)
+  gym_abort(
+    c(paste0("The log \"", path, "\" is damaged."), x = conditionMessage(cnd)),
+    class = "gym_error_argument", argument = "...", value = path, call = call
+  )
+}
+
+path_curves <- function(path, call) {
+  if (dir.exists(path)) {
+    return(folder_curves(path, call))
+  }
+  table <- file_table(path)
+  if (has_episodes(table)) monitor_curves(table, path) else table
+}
+
+# The rows of a folder or of those below it, `NULL` if there is no log; `run` identifies the run.
+folder_curves <- function(path, call) {
+  inside <- function(name) file.path(path, name)
+  if (file.exists(inside("config.json")) && file.exists(inside("evaluations.csv"))) {
+    return(own_curves(path))
+  }
+  files <- c(inside("progress.csv"), list.files(path, "monitor[.]csv$", full.names = TRUE))
+  tables <- read_logs(files[file.exists(files)], call, file_table)
+  of_monitor <- vapply(tables, has_episodes, NA)
+  progress <- do.call(rbind, tables[!of_monitor])
+  episodes <- if (any(of_monitor)) monitor_curves(do.call(rbind, tables[of_monitor]), path)
+  kinds <- list(if (any(progress$kind == "curve")) progress, episodes, progress)
+  found <- Find(NROW, kinds) %||% Find(Negate(is.null), kinds)
+  if (!is.null(found)) {
+    return(found)
+  }
+  below <- c(list.files(path, "[.]csv$", full.names = TRUE), list.dirs(path, recursive = FALSE))
+  do.call(rbind, read_logs(setdiff(below, files), call))
+}
+
+own_curves <- function(path) {
+  config <- jsonlite::read_json(file.path(path, "config.json"))
+  rows <- utils::read.csv(file.path(path, "evaluations.csv"))
+  run_rows(path, rows, env_id = config$env, seed = config$seed)
+}
+
+# Files of saveRDS() contain zeros.
+is_text <- function(file) {
+  opened <- gzfile(file, "rb")
+  on.exit(close(opened))
+  !any(readBin(opened, "raw", 1000L) == as.raw(0L))
+}
+
+# The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies
+# the kind of file.
+file_table <- function(file) {
+  lines <- if (is_text(file)) readLines(file, warn = FALSE)
+  if (!length(lines)) {
+    return(NULL)
+  }
+  if (startsWith(lines[[1L]], "#")) {
+    return(monitor_episodes(lines))
+  }
+  table <- utils::read.csv(text = lines, check.names = FALSE)
+  if ("time/total_timesteps" %in% names(table)) {
+    progress_curves(table, file)
+  } else {
+    cleanrl_curves(table, file)
+  }
+}
+
+# Stable-Baselines3's logger, whose columns ours has, too.
+progress_curves <- function(table, file) {
+  evaluated <- any(!is.na(table[["eval/mean_reward"]]))
+  value <- table[[if (evaluated) "eval/mean_reward" else "rollout/ep_rew_mean"]]
+  rows <- data.frame(
+    steps = table[["time/total_timesteps"]], mean_return = value %||% rep(NA_real_, nrow(table)),
+    kind = rep(if (evaluated) "curve" else "training", nrow(table))
+  )
+  run_rows(dirname(file), rows)
+}
+
+# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. In a
+# resumed file that line has the start of the first session, and time begins anew in each.
+monitor_episodes <- function(lines) {
+  about <- jsonlite::fromJSON(sub("^#", "", lines[[1L]]))
+  rows <- utils::read.csv(text = c(lines[-1L], if (length(lines) == 1L) "r,l,t"))
+  rows <- list2DF(lapply(rows[c("r", "l", "t")], log_numbers))
+  rows <- rows[stats::complete.cases(rows), ]
+  rows$session <- cumsum(diff(c(-Inf, rows$t)) < 0)
+  rows$time <- rows$t + about$t_start
+  rows$env_id <- rep(about$env_id %||% NA_character_, nrow(rows))
+  rows
+}
+
+has_episodes <- function(table) "session" %in% names(table)
+
+# Parallel environments have a file each. Within a file episodes stay in their order.
+monitor_curves <- function(episodes, path) {
+  episodes <- episodes[order(episodes$session, episodes$time), ]
+  rows <- data.frame(
+    steps = cumsum(as.numeric(episodes$l)), mean_return = episodes$r,
+    kind = rep("training", nrow(episodes)), episodes = rep(1L, nrow(episodes))
+  )
+  run_rows(path, rows, env_id = episodes$env_id[1L])
+}
+
+# A table of TensorBoard has one run. One of Weights & Biases has the columns of one run, or a
+# column for each, named after it.
+cleanrl_curves <- function(table, file) {
+  if (all(c("Step", "Value") %in% names(table))) {
+    return(run_rows(file, training_rows(table$Step, table$Value)))
+  }
+  columns <- grep("episodic_return$", names(table), value = TRUE)
+  steps <- table[[intersect(c("global_step", "_step", "Step"), names(table))[1L]]]
+  if (!length(columns) || is.null(steps)) {
+    return(NULL)
+  }
+  do.call(rbind, lapply(columns, function(column) {
+    run <- sub(" - [^ ]*episodic_return$", "", column)
+    run_rows(
+      if (run == column) file else run, training_rows(steps, table[[column]])
+    )
+  }))
+}
+
+training_rows <- function(steps, value) {
+  data.frame(steps = steps, mean_return = value, kind = rep("training", length(steps)))
+}
+
+log_numbers <- function(x) {
+  if (!is.numeric(x) && !all(is.na(x))) rlang::abort("A column of numbers has text.")
+  as.numeric(x)
+}
+
+# A run with all columns. If the log lacks a value, it is taken from the name of the run: CleanRL's
+# consists of environment, script, seed and time.
+run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
+  name <- basename(run)
+  pattern <- "^(run-)?(.+)__(.+)__([0-9]+)__[0-9]+.*$"
+  if (grepl(pattern, name)) {
+    env_id <- env_id %||% sub(pattern, "\\2", name)
+    seed <- seed %||% sub(pattern, "\\4", name)
+  }
+  if (grepl("seed[-_=]?[0-9]", name)) {
+    seed <- seed %||% sub(".*seed[-_=]?([0-9]+).*", "\\1", name)
+  }
+  rows[c("steps", "mean_return")] <- lapply(rows[c("steps", "mean_return")], log_numbers)
+  # Rows of other numbers have none, and a line that was being written at a crash.
+  rows <- rows[!is.na(rows$steps) & !is.na(rows$mean_return), ]
+  missing <- setdiff(names(no_curve), names(rows))
+  rows[missing] <- lapply(no_curve[missing], function(none) rep(none[NA_integer_], nrow(rows)))
+  rows$env_id <- rep(env_id %||% NA_character_, nrow(rows))
+  rows$seed <- rep(as.numeric(seed %||% NA), nrow(rows))
+  # A table without rows has logical columns.
+  rows <- if (nrow(rows)) rows[names(no_curve)] else no_curve
+  cbind(rows, run = rep(run, nrow(rows)))
+}
