@@ -94,7 +94,7 @@ def _letters(name: str) -> str:
     return name.lower().replace("_", "")
 
 
-def _named(names: Mapping[str, Any]) -> Kind:
+def named(names: Mapping[str, Any]) -> Kind:
     """Create a field that accepts some names, ignoring case and underscores."""
     by_letters = {_letters(name): meaning for name, meaning in names.items()}
 
@@ -120,7 +120,7 @@ RESET_SEED = Kind(
 NUM_WORKERS = Kind("an integer, 0 or greater", integer)
 MASK = Kind("a list of true or false for each sub-environment", _mask, empty_is_absent=False)
 QUERY_INTEGER = Kind("an integer, 0 or greater", _query_integer)
-VECTORIZATION_MODE = _named({name: name for name in ("vector_entry_point", "sync", "async")})
-AUTORESET_MODE = _named({mode.value: mode for mode in AutoresetMode})
+VECTORIZATION_MODE = named({name: name for name in ("vector_entry_point", "sync", "async")})
+AUTORESET_MODE = named({mode.value: mode for mode in AutoresetMode})
 FINAL_OBS = Field("final_obs", BOOLEAN)
 INFO = Field("info", BOOLEAN)

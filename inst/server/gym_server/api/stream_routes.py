@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import uuid
 
+from gym_server.api import env_fields
 from gym_server.api.calls import Call
 from gym_server.api.routing import INSTANCE, RouteBlueprint
 from gym_server.api.stream import Stream
 from gym_server.api.websocket import accept_key
 from gym_server.errors import GymServerError
-from gym_server.protocol.fields import KEY, Field, Kind
+from gym_server.protocol.fields import KEY, Field
 from gym_server.response import Response
 
 bp = RouteBlueprint("stream")
-
-
-def _word(word: str) -> Kind:
-    def is_word(value: object) -> bool:
-        if value != word:
-            raise ValueError
-        return True
-
-    return Kind(f'"{word}"', is_word)
 
 
 @bp.declare(
     "GET",
     INSTANCE + "stream/",
     Field("key", KEY),
-    Field("order", _word("column")),
-    Field("numbers", _word("float64")),
+    Field("order", env_fields.named({"column": True})),
+    Field("numbers", env_fields.named({"float64": True})),
 )
 def env_stream(call: Call) -> Response:
     """Open a WebSocket for steps and resets."""
@@ -46,7 +38,7 @@ def env_stream(call: Call) -> Response:
             "without a WebSocket, POST to step/ and reset/",
         )
     own = call.fields["key"] or uuid.uuid4().hex
-    by_column, as_float64 = (call.fields[name] is not None for name in ("order", "numbers"))
+    by_column, as_float64 = (bool(call.fields[name]) for name in ("order", "numbers"))
     stream = Stream(call, own, by_column, as_float64)
     accepted = (
         ("Upgrade", "websocket"),
