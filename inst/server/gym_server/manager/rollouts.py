@@ -52,13 +52,13 @@ class _Player:
         process: the process; None until it is started.
         request: what it is playing, or None.
         units: the units that it is playing.
-        last: the request whose task the process has, or None.
+        last: the task that the process has, or None.
     """
 
     process: WorkerProcess | None = None
     request: RolloutRequest | None = None
     units: range = range(0)
-    last: RolloutRequest | None = None
+    last: Task | None = None
 
 
 class Rollouts:
@@ -280,10 +280,10 @@ class Rollouts:
                 raise shutting_down()
         if request.function == "describe":
             return 1, process.call("describe", request.task), None
-        task = None if request is player.last else request.task
+        task = None if request.task is player.last else request.task
         player.last = None
         done, tensors, error = process.call("play", task, [request.units[unit] for unit in units])
-        player.last = request
+        player.last = request.task
         return done, tensors, error
 
     def _enter_error(

@@ -23,7 +23,7 @@ from gym_server.rollouts.task import Task, Unit
 # Importing it takes longer than starting a process.
 start.preload(__name__)
 
-# How long to play before returning the results, so that others get their turn.
+# How long to play before returning the results, so that all processes share the episodes.
 _SECONDS = 0.015
 
 # How many environments to keep; enough for two clients at a time.
