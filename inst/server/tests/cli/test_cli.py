@@ -184,7 +184,7 @@ def test_an_option_that_is_gone_names_what_replaces_it(option, instead, capsys):
 
 
 # The calls before the one that hangs take less, even on a busy machine.
-HANGS = ("--max-call-seconds", "4")
+HANGS = ("--max-call-seconds", "8")
 
 
 def ended(server, url, status=1):
@@ -204,7 +204,7 @@ def test_a_call_that_hangs_ends_the_server_which_says_why(serve, eventually):
     log = ended(server, url)
     assert (
         f"step() of instance {url.rsplit('/', 1)[1]} of faulty_envs:Hanging-v0 (name 'mine') took "
-        "more than 4 seconds, so the server ends; its option --max-call-seconds sets the limit\n"
+        "more than 8 seconds, so the server ends; its option --max-call-seconds sets the limit\n"
     ) in log
     assert "hanging.py" in log
     assert workers and children
