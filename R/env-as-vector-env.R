@@ -167,6 +167,27 @@ close_or_warn <- function(env) {
   )
 }
 
+#' Construct a vector environment, the one thing that everything plays
+#'
+#' The arguments are its elements. [as_vector_env()] says what the first ones promise; those without
+#' a default are always there. Play adds `call`, the user's call, which errors name, and `recipe`,
+#' see [environment_recipe()]. Models add `model`, `possible` and `endless`.
+#' @param reset,step `NULL` only with `description`.
+#' @param step_one,guard If there is one sub-environment, and it is in R: a function of one action
+#'   that returns a step without a batch, and one that evaluates many such steps and adds the place
+#'   to their errors.
+#' @param description What a server needs to play whole episodes itself, see [describe_env()]; it
+#'   then also has `known`, what is known about the environment, and `make_stepped()`, which makes
+#'   the environment that R steps.
+#' @noRd
+new_vector_env <- function(observation_space, action_space, spec, num_envs, batch_size, one_seed,
+                           reset = NULL, step = NULL, step_bare = NULL, begins_next = FALSE,
+                           frame = NULL, remembers = character(), env = NULL, client = NULL,
+                           close = function(wait = TRUE) invisible(), step_one = NULL,
+                           guard = NULL, description = NULL) {
+  structure(mget(names(formals())), class = "gym_vector_env")
+}
+
 # Seeing one as a vector environment ---------------------------------------------------
 
 #' Convert an environment that was made before to a vector environment
@@ -176,7 +197,7 @@ close_or_warn <- function(env) {
 #' @return As [as_vector_env()].
 #' @noRd
 vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::caller_env()) {
-  vector_env <- if (is.null(env$num_envs)) {
+  parts <- if (is.null(env$num_envs)) {
     single_env(env)
   } else if (identical(env$vectorization_mode, "vector_entry_point")) {
     check_ended_can_step(env, call)
@@ -184,23 +205,21 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
   } else {
     independent_sub_envs(env)
   }
-  vector_env$spec <- env$spec
-  vector_env$client <- env$client
-  vector_env$env <- env
-  vector_env$batch_size <- if (vector_env$one_seed || is.null(env$num_envs)) {
-    vector_env$num_envs
+  parts$batch_size <- if (parts$one_seed || is.null(env$num_envs)) {
+    parts$num_envs
   } else {
-    batch_size %||% episodes_of_batch(vector_env$num_envs)
+    batch_size %||% episodes_of_batch(parts$num_envs)
   }
-  vector_env$remembers <- remembering(env$spec$wrappers)
-  vector_env$close <- function(wait = TRUE) NULL
   if (frames) {
     check_draws(env, call)
-    vector_env$frame <- function() png_frame(env$client, env$instance_id, call)
+    parts$frame <- function() png_frame(env$client, env$instance_id, call)
     # The last frame of an episode is drawn before the next one begins.
-    vector_env$begins_next <- FALSE
+    parts$begins_next <- FALSE
   }
-  structure(vector_env, class = "gym_vector_env")
+  rlang::exec(
+    new_vector_env, !!!parts, spec = env$spec, remembers = remembering(env$spec$wrappers),
+    env = env, client = env$client
+  )
 }
 
 # The number of episodes in a batch for sub-environments with their own seeds. With four episodes

@@ -82,22 +82,18 @@ described_env <- function(client, answer, fields, wrappers, arguments) {
   observed <- read_space(answer, "observation_space")
   observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
   num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
-  structure(
-    list(
-      observation_space = observed, action_space = read_space(answer, "action_space"),
-      num_envs = num_envs, one_seed = !is.null(answer$group), client = client,
-      spec = c(
-        read_spec(answer$env_id, answer$spec),
-        list(wrappers = wrapper_names(wrappers), kwargs = arguments)
-      ),
-      remembers = character(),
-      description = list(
-        fields = fields, group = answer$group, processes = answer$processes %||% 1L,
-        needs_max_steps = answer$needs_max_steps %||% is.null(answer$spec$max_episode_steps),
-        versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
-      )
+  new_vector_env(
+    observed, read_space(answer, "action_space"),
+    c(
+      read_spec(answer$env_id, answer$spec),
+      list(wrappers = wrapper_names(wrappers), kwargs = arguments)
     ),
-    class = "gym_vector_env"
+    num_envs, episodes_of_batch(num_envs), one_seed = !is.null(answer$group), client = client,
+    description = list(
+      fields = fields, group = answer$group, processes = answer$processes %||% 1L,
+      needs_max_steps = answer$needs_max_steps %||% is.null(answer$spec$max_episode_steps),
+      versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
+    )
   )
 }
 

@@ -35,18 +35,6 @@ r_vector_env <- function(env, num_envs, max_envs, frames, call = rlang::caller_e
   scalar_vector_env(sub_envs, episodes_of_batch(num_envs %||% r_sub_envs), frames, alone)
 }
 
-new_r_vector_env <- function(traits, ..., frames, sub_env) {
-  structure(
-    list(
-      observation_space = traits$observation_space, action_space = traits$action_space,
-      spec = traits$spec, ...,
-      frame = if (frames) function() sub_env_png(sub_env), remembers = character(), client = NULL,
-      close = function(wait = TRUE) invisible()
-    ),
-    class = "gym_vector_env"
-  )
-}
-
 # One function call for each sub-environment and step ----------------------------------
 
 #' Play several sub-environments together
@@ -60,9 +48,10 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
   number <- function(i) if (length(sub_envs) > 1L) i
   pick <- action_picker(traits$action_space)
   stack <- result_stacker(traits)
-  new_r_vector_env(
-    traits, num_envs = length(sub_envs), batch_size = batch_size, one_seed = FALSE,
-    env = alone,
+  new_vector_env(
+    traits$observation_space, traits$action_space, traits$spec, num_envs = length(sub_envs),
+    batch_size = batch_size, one_seed = FALSE, env = alone,
+    frame = if (frames) function() sub_env_png(sub_envs[[1L]]),
     step_one = if (!is.null(alone)) single_stepper(sub_envs[[1L]]),
     guard = if (!is.null(alone)) single_guard(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
@@ -109,8 +98,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
       }
       result$next_observation <- result$observation
       result
-    },
-    frames = frames, sub_env = sub_envs[[1L]]
+    }
   )
 }
 
@@ -274,8 +262,9 @@ stack_checked <- function(outs, sub_envs, numbers, call) {
 vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   sub_env <- definition_sub_env(definition, num_envs)
   traits <- definition$traits
-  new_r_vector_env(
-    traits, num_envs = num_envs, batch_size = num_envs, one_seed = TRUE,
+  new_vector_env(
+    traits$observation_space, traits$action_space, traits$spec, num_envs = num_envs,
+    batch_size = num_envs, one_seed = TRUE, frame = if (frames) function() sub_env_png(sub_env),
     reset = function(seeds, which = NULL) {
       reset_sub_env(sub_env, seeds[[1L]], call = rlang::current_env())
     },
@@ -291,8 +280,7 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
       out <- complete_step(out, sub_env, call = call)
       out$next_observation <- out$observation
       if (some) rows_of_step(traits$observation_space, out, which) else out
-    },
-    frames = frames, sub_env = sub_env
+    }
   )
 }
 

@@ -47,3 +47,78 @@ print.gym_frame <- function(x, ...) {
   cat("<gym_frame: ", ncol(x), " x ", nrow(x), " pixels>\n", sep = "")
   invisible(x)
 }
+
+# The frames of an episode ----------------------------------------------------------------
+
+# The frames of an episode, as kept by rollout(frames = TRUE): as PNG files, because a frame of
+# CartPole takes 3 MB as numbers and 3 kB as a PNG file.
+
+#' Make the frames of an episode
+#' @param files A list of PNG files, each a raw vector.
+#' @param fps The number of frames per second, `NULL` if the environment does not say.
+#' @return An object of class `gym_frames`, a list whose elements are unpacked by `[[`.
+#' @noRd
+new_frames <- function(files, fps = NULL) {
+  structure(files, fps = fps, class = "gym_frames")
+}
+
+#' @export
+`[.gym_frames` <- function(x, i) new_frames(unclass(x)[i], attr(x, "fps"))
+
+#' @export
+`[[.gym_frames` <- function(x, i) frame_from_png(unclass(x)[[i]])
+
+#' @export
+print.gym_frames <- function(x, ...) print_line(x)
+
+#' @export
+format.gym_frames <- function(x, ...) {
+  size <- if (length(x)) paste0(" of ", paste(png_size(unclass(x)[[1L]]), collapse = " x "))
+  fps <- attr(x, "fps")
+  pace <- if (!is.null(fps)) paste0(", ", number_text(fps), " a second")
+  paste0("<gym_frames: ", count_of(length(x), "frame"), size, if (length(x)) " pixels", pace, ">")
+}
+
+# Pictures from the server --------------------------------------------------------
+
+# Checks before play whether the environment can be drawn.
+check_draws <- function(env, call) {
+  label <- environment_label(env)
+  if (!is.null(env$num_envs)) {
+    gym_abort(
+      c(paste0("Only an environment without sub-environments can keep frames, but this ", label,
+               " has ", count_of(env$num_envs, "sub-environment"), "."),
+        i = paste0("Make it without `num_envs`, or give its id instead.")),
+      class = "gym_error_argument", argument = "env", value = env, call = call
+    )
+  }
+  draws <- FALSE
+  if (is_server_env(env)) {
+    check_open(env, call)
+    draws <- known_instance(env$client, env$instance_id, call = call)$draws
+  }
+  if (!draws) {
+    gym_abort(
+      c(paste0("There are no frames to keep: ", label, " cannot be drawn."),
+        i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations."),
+      class = "gym_error_argument", argument = "frames", value = TRUE, call = call
+    )
+  }
+}
+
+#' Fetch the current frame as a PNG file
+#' @return A raw vector.
+#' @noRd
+png_frame <- function(client, instance_id, call = rlang::caller_env()) {
+  check_png(get_answer(client, paste0(instance_route(instance_id), "render/"), call = call)$png)
+}
+
+#' Unpack a frame
+#' @return An object of class `gym_frame`, as returned by [env_render()].
+#' @noRd
+frame_from_png <- function(file) {
+  check_suggested("png", "unpack a frame")
+  values <- png::readPNG(file)
+  shape <- c(dim(values), 1L)[1:3]
+  new_frame(array(as.integer(round(255 * values)), shape))
+}

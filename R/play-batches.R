@@ -138,3 +138,103 @@ episode_results <- function(history) {
 # Whether candidates can play the same episodes. They cannot if R steps sub-environments that share
 # a seed.
 has_common_seeds <- function(vector_env) !vector_env$one_seed || !is.null(vector_env$description)
+
+# The environment that plays --------------------------------------------------------------
+
+#' Call a function with the vector environment of an environment
+#'
+#' A vector environment that was made for this is closed when `play` returns.
+#' @param episodes The largest number of episodes.
+#' @param play A function of the vector environment.
+#' @param max_steps The user's value. A smaller limit of the environment gives a warning.
+#' @param ... Further arguments of [as_vector_env()].
+#' @param client The user's client. Its default starts a server, so it is only passed on: a method
+#'   for an environment without a server never evaluates it.
+#' @param seed The seed of a random map, see [with_random_map()].
+#' @noRd
+with_vector_env <- function(env, episodes, play, max_steps = NULL, ..., client = gym_client(),
+                            seed = NULL, call = rlang::caller_env()) {
+  # Errors from making the environment should name the user's call, too.
+  rlang::local_error_call(call)
+  arguments <- with_random_map(env, list(...), seed)
+  made <- NULL
+  finished <- FALSE
+  on.exit(if (!is.null(made)) made$close(wait = finished))
+  complete <- function(vector_env) {
+    vector_env$call <- call
+    vector_env$recipe <- environment_recipe(env, vector_env, arguments)
+    vector_env
+  }
+  make <- function() {
+    if (is.null(made)) {
+      vector_env <- naming_own_call(
+        rlang::inject(as_vector_env(env, !!!arguments, client = client, max_envs = episodes)),
+        "as_vector_env", call
+      )
+      made <<- complete(vector_env)
+      inform_of_memory(made, env)
+      if (calls_r(env) && is_made_by_server(env)) inform_calls_r(made)
+    }
+    made
+  }
+  vector_env <- describe_to_play(env, arguments, client, call)
+  if (is.null(vector_env)) {
+    vector_env <- make()
+  } else {
+    vector_env <- complete(vector_env)
+    vector_env$make_stepped <- make
+  }
+  warn_of_own_limit(max_steps, vector_env, call)
+  value <- play(vector_env)
+  finished <- TRUE
+  value
+}
+
+# Arguments about sub-environments are not arguments of the environment.
+describe_to_play <- function(env, arguments, client, call) {
+  of_sub_envs <- rlang::names2(arguments) %in% c("num_envs", "num_workers", "frames")
+  given <- arguments[of_sub_envs]
+  check_count(given$num_envs, allow_null = TRUE, arg = "num_envs", call = call)
+  check_count(given$num_workers, min = 0, allow_null = TRUE, arg = "num_workers", call = call)
+  described <- describe_env(
+    env, arguments[!of_sub_envs], client, given$num_envs, isTRUE(given$frames), call = call
+  )
+  if (isTRUE(described$one_seed)) check_no_workers(given$num_workers, call)
+  described
+}
+
+# `max_steps` cannot extend the environment's own limit.
+warn_of_own_limit <- function(max_steps, vector_env, call) {
+  own <- vector_env$spec$max_episode_steps
+  if (!is.null(max_steps) && !is.null(own) && own < max_steps) {
+    wanted <- format(max_steps, scientific = FALSE)
+    id <- environment_label(vector_env)
+    rlang::warn(
+      c(paste0("`max_steps = ", wanted, "` makes no episode longer: ", id,
+               " has a limit of its own, ", count_of(own, "step"), "."),
+        i = paste0("`max_episode_steps = ", wanted, "` as a further argument of `gym_make()` ",
+                   "sets another limit; a TimeLimit wrapper can only lower it.")),
+      class = "gym_warning_max_steps", call = call
+    )
+  }
+}
+
+# Only if it was decided here to play one episode after the other.
+inform_of_memory <- function(vector_env, env) {
+  if (length(vector_env$remembers) && is_given_by_id(env)) {
+    rlang::inform(
+      c(i = paste0(paste(vector_env$remembers, collapse = " and "), " remembers earlier episodes, ",
+                   "so they are played one after the other, in one batch.")),
+      class = "gym_message_remembers"
+    )
+  }
+}
+
+inform_calls_r <- function(vector_env) {
+  names <- intersect(names(transforms), vector_env$spec$wrappers)
+  rlang::inform(
+    c(i = paste0(paste(names, collapse = " and "), " calls an R function in each step, so R plays ",
+                 "step by step, which takes longer than playing on the server.")),
+    class = "gym_message_calls_r", .frequency = "once", .frequency_id = "gym_calls_r"
+  )
+}

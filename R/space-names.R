@@ -51,3 +51,85 @@ naming_of_parts <- function(parts, labels) {
     value
   }
 }
+
+# Columns of tables -----------------------------------------------------------------------
+
+#' Put observations into columns
+#'
+#' The columns of the table of steps, which models are fitted to. They have the names of the space,
+#' or otherwise `obs_1`, `obs_2`, ..., with the keys of a Dict such as `obs_position_1`.
+#' @param values Many observations, as returned by [batch_of()].
+#' @return A named list of columns.
+#' @noRd
+observation_columns <- function(space, values) {
+  columns <- value_columns(space, values, "obs")
+  names(columns) <- if (is_stackable(space)) {
+    number_names(space, length(columns))
+  } else if (!is.null(space$names)) {
+    beside_steps(sub("^obs_", "", names(columns)))
+  } else {
+    names(columns)
+  }
+  columns
+}
+
+#' Name the numbers of an observation that is an array or a single number
+#' @param space The observation space, `NULL` if it is unknown.
+#' @noRd
+number_names <- function(space, n = prod(space$shape)) {
+  if (is.null(space$names)) {
+    paste0("obs_", seq_len(n), recycle0 = TRUE)
+  } else {
+    beside_steps(space$names)
+  }
+}
+
+# A name that another column of the table of steps has, or may have, gets the prefix `obs_`.
+beside_steps <- function(names) {
+  taken <- names %in% c("candidate", "episode", "step", "reward", "terminated", "truncated") |
+    grepl("^(action|next|obs)(_|$)", names)
+  paste0(ifelse(taken, "obs_", ""), names, recycle0 = TRUE)
+}
+
+part_columns <- function(name, parts) paste0(name, "_", parts, recycle0 = TRUE)
+
+#' Put values of a space into columns
+#'
+#' Numbers have a column each, in row-major order; so have the parts of Tuple and Dict. Values with
+#' a variable number of parts have one column that is a list.
+#' @param values The values, as returned by [batch_of()].
+#' @param name Their name, such as `"action"`.
+#' @return A named list of columns.
+#' @noRd
+value_columns <- function(space, values, name) UseMethod("value_columns")
+
+#' @exportS3Method
+value_columns.default <- function(space, values, name) stats::setNames(list(I(values)), name)
+
+#' @exportS3Method
+value_columns.gym_space_array <- function(space, values, name) {
+  numbers <- number_rows(values)
+  n <- ncol(numbers)
+  # In a matrix of one row with named columns the number would keep its name.
+  each <- lapply(seq_len(n), function(i) unname(numbers[, i]))
+  parts <- space$names %||% if (n > 1L) seq_len(n)
+  stats::setNames(each, if (n == 1L && is.null(parts)) name else part_columns(name, parts))
+}
+
+#' @exportS3Method
+value_columns.gym_space_discrete <- function(space, values, name) {
+  stats::setNames(list(values), name)
+}
+
+#' @exportS3Method
+value_columns.gym_space_text <- value_columns.gym_space_discrete
+
+#' @exportS3Method
+value_columns.gym_space_tuple <- function(space, values, name) {
+  parts <- names(space$spaces) %||% space$names %||% seq_along(space$spaces)
+  columns <- Map(value_columns, unname(space$spaces), unname(values), part_columns(name, parts))
+  do.call(c, unname(columns))
+}
+
+#' @exportS3Method
+value_columns.gym_space_dict <- value_columns.gym_space_tuple

@@ -98,3 +98,120 @@ test_that("drawing works for all of classic control, while others are closed", {
     env$close()
   }
 })
+
+# The frames of an episode ----------------------------------------------------------------
+
+test_that("there is a frame before the first step and one after each", {
+  played <- short_rollout(episodes = 3)
+  expect_length(played$frames, 3)
+  expect_identical(lengths(played$frames), played$episodes$length + 1L)
+  expect_s3_class(played$frames[[1]], "gym_frames")
+  expect_null(rollout("CartPole-v1", policy_random(), client = test_client())$frames)
+})
+
+test_that("the frames are what the environment draws when the episode is played again", {
+  skip_if_not_installed("png")
+  played <- short_rollout(max_steps = 4, episodes = 2)
+  env <- local_env("CartPole-v1")
+  for (episode in 1:2) {
+    frames <- played$frames[[episode]]
+    env$reset(seed = played$episodes$seed[episode])
+    expect_identical(frames[[1]], env$render())
+    for (step in 1:4) {
+      env$step(played$steps$action[played$steps$episode == episode][step])
+      expect_identical(frames[[step + 1]], env$render())
+    }
+  }
+})
+
+test_that("frames change nothing of what a single environment plays, nor what is drawn", {
+  skip_unless_all()
+  env <- local_env("CartPole-v1")
+  without <- rollout(env, policy_random(), episodes = 3, seed = 1, steps = TRUE)
+  with <- rollout(env, policy_random(), episodes = 3, seed = 1, steps = TRUE, frames = TRUE)
+  expect_identical(with[c("episodes", "steps")], without[c("episodes", "steps")])
+  by_id <- rollout("CartPole-v1", policy_random(), 3, seed = 1, frames = TRUE,
+                   client = test_client())
+  expect_identical(by_id$episodes, without$episodes)
+  expect_null(by_id$num_envs)
+})
+
+test_that("an environment that was made for the frames is closed", {
+  server <- local_server()
+  rollout("CartPole-v1", policy_random(), max_steps = 2, frames = TRUE, client = server)
+  expect_length(env_list_all(server), 0)
+})
+
+test_that("frames print, and unpack when they are taken out", {
+  skip_if_not_installed("png")
+  frames <- short_rollout(max_steps = 3)$frames[[1]]
+  expect_output(print(frames), "<gym_frames: 4 frames of 600 x 400 pixels, 50 a second>",
+                fixed = TRUE)
+  expect_s3_class(frames[2:3], "gym_frames")
+  expect_length(frames[2:3], 2)
+  expect_identical(frames[2:3][[2]], frames[[3]])
+  expect_identical(lapply(frames, dim), rep(list(c(400L, 600L, 3L)), 4))
+  expect_error(frames[[5]], "subscript out of bounds")
+})
+
+test_that("grey and half transparent frames are kept as they are", {
+  skip_unless_all()
+  skip_if_not_installed("png")
+  server <- local_odd_server()
+  for (channels in c(1, 3, 4)) {
+    env <- make_odd(paste0("Drawing", channels), server)
+    frames <- rollout(env, policy_random(), frames = TRUE)$frames[[1]]
+    expect_length(frames, 6)
+    env$reset()
+    expect_identical(frames[[1]], env$render())
+    expect_identical(attr(frames, "fps"), 10L)
+  }
+})
+
+test_that("an environment that cannot be drawn is refused before anything is played", {
+  skip_unless_all()
+  env <- make_odd("Image", local_odd_server())
+  error <- expect_error(rollout(env, policy_random(), frames = TRUE), "Image-v0 cannot be drawn",
+                        class = "gym_error_argument")
+  expect_identical(error$argument, "frames")
+  # It was never reset.
+  expect_error(env$render(), class = "gym_error_http_400")
+  expect_error(env$step(0), "needs a running episode")
+  fake <- fake_environment()
+  expect_error(rollout(fake, policy_random(), frames = TRUE), "cannot be drawn",
+               class = "gym_error_argument")
+  expect_length(fake$seeds, 0)
+})
+
+test_that("a vector environment is refused, and a flag must be one", {
+  env <- local_env("CartPole-v1", num_envs = 2)
+  expect_error(rollout(env, policy_random(), frames = TRUE), "has 2 sub-environments",
+               class = "gym_error_argument")
+  expect_error(rollout("CartPole-v1", policy_random(), frames = 1, client = no_client()),
+               "`frames` must be TRUE or FALSE", class = "gym_error_argument")
+})
+
+test_that("several sub-environments whose frames are wanted are refused, however they are named", {
+  drawn <- gym_env(
+    function(self) 0, function(self, action) list(observation = 0, reward = 1, terminated = TRUE),
+    space_discrete(1), space_discrete(2), render = function(self) array(255L, c(8, 8, 3))
+  )
+  gym_register("Drawn-v0", drawn)
+  withr::defer(gym_unregister("Drawn-v0"))
+  play <- function(env, num_envs) {
+    rollout(env, policy_random(), frames = TRUE, num_envs = num_envs, client = no_client())
+  }
+  for (env in list("CartPole-v1", gym_wrap("CartPole-v1", "ClipReward"), "Drawn-v0")) {
+    cnd <- expect_error(play(env, 4), "`num_envs` must be 1 to keep frames, not 4",
+                        class = "gym_error_argument")
+    expect_identical(cnd$argument, "num_envs")
+  }
+  expect_length(play("Drawn-v0", 1)$frames, 1)
+})
+
+test_that("an environment has its number of frames a second", {
+  skip_unless_all()
+  expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
+  expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)
+  expect_null(make_odd("Image", local_odd_server())$spec$render_fps)
+})
