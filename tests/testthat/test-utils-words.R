@@ -35,12 +35,12 @@ test_that("ids and names of arguments keep their case at the start of a sentence
 })
 
 test_that("other libraries' names of arguments lead to ours", {
-  ppo <- names(formals(learn_ppo))
+  ppo <- names(formals(agent_ppo))
   expect_identical(nearest_name("lr", ppo), "learning_rate")
   expect_identical(nearest_name("n_steps", ppo), "batch_steps")
   expect_identical(nearest_name("batch_size", ppo), "batch")
   expect_identical(nearest_name("discount", ppo), "gamma")
-  expect_identical(nearest_name("alpha", names(formals(learn_q))), "learning_rate")
+  expect_identical(nearest_name("alpha", names(formals(agent_q))), "learning_rate")
   expect_identical(nearest_name("n", names(formals(rollout))), "episodes")
   # A name of ours is not replaced by one that is there, too.
   expect_identical(nearest_name("stepsize", names(formals(agent_ars))), "step_size")
