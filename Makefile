@@ -48,7 +48,7 @@ test:
 	@tools/in-env tools/test
 
 test-all:
-	@tools/setup test
+	@tools/setup test sb3
 	@tools/in-env tools/test all
 
 soak:

@@ -7,7 +7,7 @@
 #                                        the file's time is the last start of a server
 #           gym/python, gym/uv           what uv and the package downloaded
 
-server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video", "jax")
+server_extras <- c("toy-text", "box2d", "mujoco", "atari", "video", "jax", "sb3")
 
 check_extras <- function(extras, call = rlang::caller_env()) {
   if (!is.character(extras) || anyNA(extras) || !all(extras %in% server_extras)) {

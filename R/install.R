@@ -23,8 +23,9 @@
 #' institution's mirror.
 #'
 #' @param extras Extras to install, a character vector of `"toy-text"`, `"box2d"`, `"mujoco"`,
-#'   `"atari"`, `"video"` and `"jax"` (600 MB). The default is none. Classic control and toy text
-#'   work without extras.
+#'   `"atari"`, `"video"`, `"jax"` (600 MB) and `"sb3"` (Stable-Baselines3 for [learn_sb3()]; with
+#'   PyTorch 5.5 GB on Linux with an Intel processor). The default is none. Classic control and toy
+#'   text work without extras.
 #' @param ... Must be empty.
 #' @param offline No longer used. `vignette("server")` shows how to install without a network.
 #' @param ask Ask first, showing the packages, the megabytes and the folder? By default `TRUE` in an

@@ -21,7 +21,7 @@ from packaging.markers import Marker
 from packaging.utils import parse_wheel_filename
 
 SERVER = Path(__file__).parent.parent / "inst" / "server"
-EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video", "jax")
+EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video", "jax", "sb3")
 PYTHONS = ((3, 10), (3, 11), (3, 12), (3, 13))
 # The Python that gym_server_install() installs.
 USUAL_PYTHON = (3, 12)
@@ -62,6 +62,7 @@ def main(folder: Path) -> None:
         path = SERVER / "lock" / f"{name}.txt"
         path.write_text("".join(f"{r}\n" for r in requirements.values()), encoding="utf-8")
         missing = set(_systems_without_wheels(requirements, packages))
+        missing |= set(_systems_left_out(project["optional-dependencies"].get(name, [])))
         header = {
             "made by": "tools/lock",
             "fingerprint": asked,
@@ -161,6 +162,13 @@ def _systems_without_wheels(requirements: dict[str, str], packages: dict) -> Ite
                 if needed and not _wheel(packages[needed], system, python):
                     print(f"No wheel of {key} for {system}, Python {python}")
                     yield system
+
+
+def _systems_left_out(declared: list[str]) -> Iterator[str]:
+    """Return the systems for which an extra's own markers leave nothing."""
+    for system in SYSTEMS:
+        if declared and not any(_needed(key, system, USUAL_PYTHON) for key in declared):
+            yield system
 
 
 def _download(requirements: dict[str, str], packages: dict) -> int:

@@ -9,7 +9,7 @@ import pytest
 from packaging.requirements import Requirement
 
 SERVER = Path(__file__).parent.parent
-EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video", "jax")
+EXTRAS = ("toy-text", "box2d", "mujoco", "atari", "video", "jax", "sb3")
 PINNED = re.compile(r"^([a-z0-9-]+)==([^ ]+)", re.MULTILINE)
 
 
