@@ -3,8 +3,9 @@
 #' Settings that solve environments
 #'
 #' [search_ars()], [search_cem()], [learn_ppo()], [learn_reinforce()], [learn_dqn()], [learn_q()],
-#' [learn_sarsa()] and [learn_monte_carlo()] use these settings if the environment is given by its
-#' id and has a row here. A message says so. Arguments that you give replace those of the preset.
+#' [learn_sarsa()], [learn_monte_carlo()] and [learn_sb3()] use these settings if the environment is
+#' given by its id and has a row here. A message says so. Arguments that you give replace those of
+#' the preset.
 #'
 #' With one or two seeds the tables reached, where the best is 0.744 for FrozenLake, 0.913 for
 #' FrozenLake8x8, 7.93 for Taxi, -13 for CliffWalking and -0.043 for Blackjack: 0.73 to 0.74 (Q),
@@ -20,9 +21,11 @@
 #'   \item{env_id, kwargs}{The environment's id, a string, and its arguments as JSON, empty for
 #'   none.}
 #'   \item{agent}{`"ars"`, `"cem"`, `"ppo"`, `"reinforce"`, `"dqn"`, `"q"`, `"sarsa"` or
-#'   `"monte_carlo"`. The agent's arguments have a
-#'   column each, see [agent_ars()] and the others; `NA` for an argument that the agent does not
-#'   have or whose default it keeps.}
+#'   `"monte_carlo"`, or in capitals an algorithm of [learn_sb3()], such as `"SAC"`. The agent's
+#'   arguments have a column each, see [agent_ars()] and the others; `NA` for an argument that the
+#'   agent does not have or whose default it keeps.}
+#'   \item{arguments, policy, num_envs}{Of [learn_sb3()]: the algorithm's arguments as JSON, the
+#'   policy's name, and the number of sub-environments.}
 #'   \item{hidden, bias}{The policy of a search: the number of hidden neurons (tanh, with normalised
 #'   observations), `NA` for a linear policy, and whether it has a bias.}
 #'   \item{hidden, init, normalize}{The network of the other agents: the number of neurons in each
@@ -33,9 +36,10 @@
 #'   `epsilon_steps`.}
 #'   \item{episodes, eval_every, total_steps, max_steps}{Of the training; `total_steps` is its
 #'   budget. Agents with long iterations are evaluated more often than every ten of them.}
-#'   \item{origin, source, tried}{`origin` is `"paper"`, with the `source`, or `"ours"`. `tried` is
-#'   the number of settings that were tried with seeds 1 to 99 before these were chosen (an
-#'   integer). `vignette("solved")` reports other seeds.}
+#'   \item{origin, source, tried}{`origin` is `"paper"` or `"zoo"` (rl-baselines3-zoo), with the
+#'   `source`, or `"ours"`. `tried` is the number of settings that were tried with seeds 1 to 99
+#'   before these were chosen (an integer; `NA` for the zoo's). `vignette("solved")` reports other
+#'   seeds.}
 #'   }
 #' @section Errors: `gym_error_argument` if `env_id` is not a string.
 #' @export
@@ -43,7 +47,22 @@
 #' agent_presets()[c("env_id", "agent", "directions", "step_size", "noise", "origin")]
 agent_presets <- function(env_id = NULL) {
   check_string(env_id, allow_null = TRUE)
-  file <- system.file("extdata", "agent-presets.csv", package = "gym", mustWork = TRUE)
+  presets <- list(own_presets(env_id), sb3_presets(env_id))
+  columns <- unique(unlist(lapply(presets, names)))
+  do.call(rbind, lapply(presets, function(table) {
+    others <- setdiff(columns, names(table))
+    table[others] <- rep(list(rep(NA, nrow(table))), length(others))
+    table[columns]
+  }))
+}
+
+# Those of the agents of this package, and those of learn_sb3().
+own_presets <- function(env_id = NULL) read_presets("agent-presets.csv", env_id)
+
+sb3_presets <- function(env_id = NULL) read_presets("sb3-presets.csv", env_id)
+
+read_presets <- function(name, env_id) {
+  file <- system.file("extdata", name, package = "gym", mustWork = TRUE)
   presets <- utils::read.csv(file, stringsAsFactors = FALSE)
   for (name in c("kwargs", "source")) {
     presets[[name]][is.na(presets[[name]])] <- ""
@@ -56,11 +75,10 @@ agent_presets <- function(env_id = NULL) {
 }
 
 # The preset of an agent for an environment with these arguments, a list, or `NULL`.
-find_preset <- function(agent, env, kwargs) {
+find_preset <- function(agent, env, kwargs, presets = own_presets(env)) {
   if (!is.character(env)) {
     return(NULL)
   }
-  presets <- agent_presets(env)
   presets <- presets[presets$agent == agent, ]
   for (row in seq_len(nrow(presets))) {
     preset <- as.list(presets[row, ])
@@ -174,7 +192,7 @@ with_preset <- function(agent, preset, given) {
 }
 
 preset_hints <- function(env, kwargs) {
-  presets <- if (is.character(env)) agent_presets(env)
+  presets <- if (is.character(env)) own_presets(env)
   known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
                   presets$kwargs, collapse = ", ")
   c(
@@ -206,7 +224,7 @@ preset_policy <- function(preset, agent) {
 }
 
 inform_of_preset <- function(preset, env) {
-  origin <- if (preset$origin == "paper") paste0("paper: ", preset$source) else "ours"
+  origin <- paste0(preset$origin, if (preset$origin == "paper") paste0(": ", preset$source))
   cli::cli_inform(
     c(i = "Taking the preset for {env} ({origin}), see {.code agent_presets(\"{env}\")}."),
     class = "gym_message_preset"

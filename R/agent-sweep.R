@@ -168,7 +168,7 @@ setting_names <- function(settings) {
 
 # The preset that the agent's own trainer, such as learn_ppo(), would use.
 sweep_preset <- function(agent, env, dots) {
-  kinds <- unique(agent_presets()$agent)
+  kinds <- unique(own_presets()$agent)
   kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))), kinds)
   if (length(kind)) {
     find_preset(kind, env, dots[setdiff(names(dots), names(formals(train_agent)))])

@@ -27,8 +27,15 @@
 #' If actions are a Box, predictions are the actions: a numeric vector or, for actions of several
 #' numbers, a matrix with an action in each row, as from [lm()] of `cbind(action_1, action_2)`.
 #'
-#' @param x A fitted model. Policies and functions of observations are returned unchanged. A
-#'   training, a search or a rollout returns its policy.
+#' # Models of Stable-Baselines3
+#'
+#' `as_policy("model.zip")` reads a zip file that `model.save()` of Stable-Baselines3 made, such as
+#' those of its zoo, and makes a [policy_network()] of it. It needs the server's extra `"sb3"`. Such
+#' a file has weights, settings in plain text, and pickles. A pickle from elsewhere can run any
+#' program with your rights, so none is loaded. What only a pickle says is an argument.
+#'
+#' @param x A fitted model, or the path of a zip file of Stable-Baselines3. Policies and functions
+#'   of observations are returned unchanged. A training, a search or a rollout returns its policy.
 #' @param ... Further arguments of the model's [predict()], or of `predict`, by name. The default of
 #'   `type` for a [glm()] is `"response"`; for `rpart::rpart()` `"class"` for a classification,
 #'   otherwise `"vector"`; for `nnet::nnet()` `"class"` if it was fitted to a factor, otherwise

@@ -81,8 +81,8 @@
 #' trains in this way.
 #'
 #' @param agent The agent, made by a function such as [agent_ars()], [agent_ppo()] or [agent_q()],
-#'   or your own, see [agent_ask()]. Other methods, such as SAC, are left to
-#'   Stable-Baselines3 and torch.
+#'   or your own, see [agent_ask()]. [learn_sb3()] trains by other methods,
+#'   such as SAC.
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
 #'   the agent's help page. Most agents start with its weights. A learner such as [agent_q()] makes

@@ -143,8 +143,7 @@ check_agent <- function(agent, call) {
           paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",
                  "`agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables ",
                  "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`, ",
-                 "`agent_actor_critic()`. Others, such as SAC, are left to Stable-Baselines3 or ",
-                 "torch.")
+                 "`agent_actor_critic()`. `learn_sb3()` trains by others, such as SAC.")
         }),
       class = "gym_error_argument", argument = "agent", value = agent, call = call
     )

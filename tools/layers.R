@@ -9,7 +9,7 @@
 
 # The one list of the floors, from the top.
 floors <- list(
-  c("plot", "animate"), "agent", "train", "mdp", "play", "policy", "env", "space", "client",
+  c("plot", "animate"), "sb3", "agent", "train", "mdp", "play", "policy", "env", "space", "client",
   c("server", "install"), "http", "utils"
 )
 

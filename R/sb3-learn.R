@@ -1,0 +1,305 @@
+#' Train with Stable-Baselines3
+#'
+#' Train a policy with [Stable-Baselines3](https://stable-baselines3.readthedocs.io) or
+#' [sb3-contrib](https://sb3-contrib.readthedocs.io) in a Python process of its own, and get it back
+#' as a policy of this package: SAC for robots, and other algorithms that R does not have, on large
+#' networks and GPUs.
+#'
+#' The process uses the server's Python. `gym_server_install(extras = "sb3")` installs
+#' Stable-Baselines3 and PyTorch there (some gigabytes on Linux, where PyTorch comes with what a GPU
+#' needs). `learn_sb3()` writes a job to a folder, runs `python -m gym_server.sb3 job.json`, shows
+#' the progress and reads the files that come of it. An interrupt ends the training at its next step
+#' and keeps the policy. If R is killed, the process ends, too.
+#'
+#' # Algorithms and their arguments
+#'
+#' `"PPO"`, `"A2C"`, `"DQN"`, `"SAC"`, `"TD3"` and `"DDPG"` of Stable-Baselines3, `"TQC"`,
+#' `"TRPO"`, `"QRDQN"` and `"CrossQ"` of sb3-contrib. Their arguments in `...` have the names of
+#' Python's, such as `learning_rate`, `buffer_size` or
+#' `policy_kwargs = list(net_arch = c(400, 300), activation_fn = "ReLU")`. As in rl-baselines3-zoo,
+#' `learning_rate = "lin_3e-4"` decreases from 3e-4 to 0, and `noise_type = "normal"` with
+#' `noise_std` adds noise to the actions of TD3 and DDPG.
+#'
+#' For some environments the values of
+#' [rl-baselines3-zoo](https://github.com/DLR-RM/rl-baselines3-zoo) are presets, see
+#' [agent_presets()]. A message says so. Arguments that you give replace them. Without a preset the
+#' defaults are the library's.
+#'
+#' # The policy
+#'
+#' The policy becomes a [policy_network()]. It acts in R alone, and [rollout()] plays it beside the
+#' environment. Actions must be Discrete or a Box, and observations numbers; the activations tanh,
+#' ReLU, leaky ReLU and logistic are known. With `normalize` the network has the moments of the
+#' observations. Its actions differ from those of `model.predict(deterministic = True)` by less than
+#' 1e-5 of their range, because PyTorch calculates in single precision. State-dependent exploration
+#' (`use_sde`) does not come back: the network takes the most likely actions. Convolutional and
+#' recurrent policies are refused before they are trained, because R could not play them.
+#'
+#' # Going on
+#'
+#' `checkpoint` is a folder: the model as a zip file, its replay buffer (up to 4 GB) and moments,
+#' written at each evaluation and at the end. The same call goes on with the remaining steps. A
+#' larger `total_steps` goes on with a finished training. Schedules refer to the whole. The training
+#' begins a new episode and draws other random numbers, so the result is not the same to the bit as
+#' that of an uninterrupted one.
+#'
+#' @param algorithm The algorithm, a string; see below.
+#' @param env The id of an environment of the server, a string.
+#' @param total_steps The number of steps of the environment, a whole number. It may be left out if
+#'   there is a preset.
+#' @param ... Arguments of the algorithm, by their Python names.
+#' @param policy The policy's name in Stable-Baselines3, a string. The default is `"MlpPolicy"`.
+#' @param env_kwargs The arguments of the environment, a list with names.
+#' @param num_envs The number of sub-environments, a whole number. The default is 1.
+#' @param normalize Normalise observations and rewards by `VecNormalize`? `FALSE`, the default,
+#'   `TRUE`, or a list of its arguments, such as `list(norm_reward = FALSE)`. The log and all
+#'   evaluations show the original rewards.
+#' @param device Where PyTorch computes, a string: `"cpu"`, `"cuda"` or, by default, `"auto"`.
+#' @param seed,seeds As for [train_agent()]. Several seeds are trained one after the other. A
+#'   `checkpoint` and a `log` have a folder for each, such as `seed-7`.
+#' @param target The mean return that the final evaluation should reach, a number. It does not end
+#'   the training. `NULL`, the default, uses the environment's target, as in [train_agent()].
+#' @param eval_every The number of steps between evaluations for the learning curve, a whole
+#'   number. `NULL`, the default, is a tenth of `total_steps`.
+#' @param eval_episodes_curve The number of episodes for a point of the curve, a whole number. The
+#'   default is 10. With 0 there is no curve.
+#' @param eval_episodes The number of episodes of the final evaluation, a whole number of at
+#'   least 2. The default is 100.
+#' @param checkpoint `NULL`, the default, or the folder that keeps the training.
+#' @param resume Go on with the training in that folder? `TRUE`, the default, or `FALSE`, which
+#'   starts again and replaces it.
+#' @param log As for [train_agent()].
+#' @param progress Show a progress bar? By default in interactive sessions only.
+#' @param client The client of the server that plays the final evaluation. The default is the
+#'   session's client, [gym_client()].
+#' @return As of [train_agent()]: an object of class `gym_training`, and with `seeds` one of class
+#'   [gym_trainings]. An iteration is a row of Stable-Baselines3's `progress.csv`, of at most a
+#'   hundred. Its returns are those of the episodes that ended since the last row. The history has
+#'   the columns that Stable-Baselines3 logs as `train/`.
+#' @section Errors: `gym_error_argument` for an invalid argument, also one that Stable-Baselines3
+#'   refuses; `gym_error_install` if it is not installed; `gym_error_checkpoint` for the folder of
+#'   another training; `gym_error_training` for an error during training, such as a loss that is
+#'   NaN. Its field `result` is the training with the last finite weights.
+#' @references A. Raffin et al. (2021), Stable-Baselines3: reliable reinforcement learning
+#'   implementations, Journal of Machine Learning Research 22(268).
+#'
+#'   T. Haarnoja et al. (2018), Soft actor-critic, ICML.
+#' @seealso [learn_ppo()] and [learn_dqn()], which need no PyTorch; [as_policy()] for models that
+#'   somebody else trained
+#' @concept SAC TD3 A2C PyTorch
+#' @export
+#' @examplesIf gym:::can_start_server() && gym:::has_sb3()
+#' trained <- learn_sb3("SAC", "Pendulum-v1", total_steps = 300, eval_episodes = 10, seed = 1)
+#' trained
+#' predict(trained, c(1, 0, 0))
+learn_sb3 <- function(algorithm, env, total_steps = NULL, ..., policy = NULL,
+                      env_kwargs = list(), num_envs = NULL, normalize = NULL, device = "auto",
+                      seed = NULL, seeds = NULL, target = NULL, eval_every = NULL,
+                      eval_episodes_curve = 10, eval_episodes = 100, checkpoint = NULL,
+                      resume = TRUE, log = NULL, progress = rlang::is_interactive(),
+                      client = gym_client()) {
+  match_whole_names()
+  call <- rlang::current_env()
+  check_sb3_env(env, call)
+  check_string(algorithm)
+  given <- list(...)
+  check_dots_named(given, "learning_rate = 1e-3", call)
+  check_named_list(env_kwargs)
+  settings <- with_sb3_preset(
+    list(
+      algorithm = algorithm, env = env, env_kwargs = env_kwargs, arguments = given,
+      policy = policy, num_envs = num_envs, normalize = normalize, total_steps = total_steps,
+      device = device, seed = seed, target = target, eval_every = eval_every,
+      eval_episodes_curve = eval_episodes_curve, eval_episodes = eval_episodes
+    )
+  )
+  check_sb3_settings(settings, call)
+  for (name in c("progress", "resume")) check_flag(get(name), arg = name, call = call)
+  check_string(checkpoint, allow_null = TRUE)
+  check_string(log, allow_null = TRUE)
+  files <- list(
+    checkpoint = if (!is.null(checkpoint)) absolute_path(checkpoint),
+    log = if (!is.null(log)) absolute_path(log), resume = resume
+  )
+  if (!is.null(seeds)) check_training_seeds(plain_numbers(seeds), seed, call)
+  python <- sb3_python(call)
+  if (is.null(seeds)) {
+    return(train_sb3(settings, files, python, progress, client, call))
+  }
+  started <- now()
+  trainings <- list()
+  for (seed in plain_numbers(seeds)) {
+    settings["seed"] <- list(seed)
+    own <- files
+    places <- !vapply(own, is.null, NA) & names(own) != "resume"
+    own[places] <- file.path(own[places], paste0("seed-", format(seed, scientific = FALSE)))
+    training <- train_sb3(settings, own, python, progress, client, call)
+    trainings <- c(trainings, list(training))
+    if (training$interrupted) break
+  }
+  new_trainings(trainings, settings, now() - started, training$interrupted)
+}
+
+# For examples and tests.
+has_sb3 <- function() !is.null(tryCatch(sb3_python(NULL), error = function(cnd) NULL))
+
+check_sb3_env <- function(env, call) {
+  check_given(env, "It is the id of an environment, such as `\"Pendulum-v1\"`.", call = call)
+  if (rlang::is_string(env) && is_made_by_server(env)) {
+    return()
+  }
+  text <- if (rlang::is_string(env)) "an environment in R" else describe_argument(env)
+  gym_abort(
+    c(paste0("Stable-Baselines3 trains in environments that Python makes from an id, not in ",
+             text, "."),
+      i = paste("`learn_ppo()` trains in environments written in R, and with wrappers that are R",
+                "functions. The arguments of an id go into `env_kwargs`.")),
+    class = "gym_error_argument", argument = "env", value = env, call = call
+  )
+}
+
+# The user's values replace the preset's, and what is left has the library's defaults.
+with_sb3_preset <- function(settings) {
+  env <- settings$env
+  preset <- find_preset(settings$algorithm, env, settings$env_kwargs, sb3_presets(env))
+  if (!is.null(preset)) {
+    inform_of_preset(preset, env)
+    arguments <- from_json(preset$arguments)
+    arguments[names(settings$arguments)] <- settings$arguments
+    settings$arguments <- arguments
+  }
+  budget <- settings$total_steps %||% preset$total_steps
+  settings$total_steps <- budget
+  default <- list(policy = "MlpPolicy", num_envs = 1, normalize = FALSE,
+                  eval_every = max(ceiling((budget %||% 1) / 10), 1))
+  for (name in names(default)) {
+    settings[[name]] <- settings[[name]] %||% preset[[name]] %||% default[[name]]
+  }
+  settings$agent <- new_sb3_agent(
+    settings$algorithm, settings$arguments, preset[c("env_id", "kwargs", "origin", "source")]
+  )
+  settings
+}
+
+check_sb3_settings <- function(settings, call) {
+  of <- function(check, name, ...) check(settings[[name]], ..., arg = name, call = call)
+  if (is.null(settings$total_steps)) {
+    gym_abort("Training needs a budget: give `total_steps` of the environment.",
+              class = "gym_error_argument", argument = "total_steps", call = call)
+  }
+  for (name in c("total_steps", "num_envs", "eval_every")) of(check_count, name)
+  of(check_count, "eval_episodes_curve", min = 0)
+  of(check_count, "eval_episodes", min = 2)
+  for (name in c("policy", "device")) of(check_string, name)
+  of(check_number, "target", allow_null = TRUE)
+  of(check_seed, "seed")
+  if (!is.list(settings$normalize)) of(check_flag, "normalize")
+}
+
+# Trains with one seed.
+train_sb3 <- function(settings, files, python, progress, client, call) {
+  folder <- files$checkpoint %||% temporary_file("gym-sb3-")
+  if (is.null(files$checkpoint)) on.exit(unlink(folder, recursive = TRUE))
+  dir.create(folder, showWarnings = FALSE, recursive = TRUE)
+  settings$seed <- settings$seed %||% draw_seed()
+  job <- sb3_job(settings, !is.null(files$checkpoint))
+  go_on_or_begin(job, folder, files, call)
+  settings$seed <- job$seed
+  settings$started <- Sys.time()
+  if (!is.null(files$log)) {
+    dir.create(files$log, showWarnings = FALSE, recursive = TRUE)
+    for (table in c("progress.csv", "evaluations.csv")) keep_as_earlier(file.path(files$log, table))
+  }
+  show <- progress_bar(settings$total_steps, "Step", shown = progress)
+  poll <- sb3_poll(folder, files$log, function(last) {
+    show(min(last[["time/total_timesteps"]], settings$total_steps),
+         paste0("return ", number_text(last[["rollout/ep_rew_mean"]]), ", "))
+  })
+  result <- run_sb3_job(job, folder, python, call, poll)
+  if (!file.exists(file.path(folder, "policy.safetensors"))) {
+    rlang::cnd_signal(sb3_error(result$error, call))
+  }
+  training <- sb3_training(settings, folder, result, client, call)
+  if (!is.null(files$log)) log_sb3(training, settings, files$log, call)
+  if (result$interrupted) {
+    cli::cli_inform(
+      c("!" = "Interrupted after {result$steps} of {settings$total_steps} steps."),
+      class = "gym_message_interrupted"
+    )
+  }
+  if (!is.null(result$error)) {
+    abort_with_result(
+      sb3_error(result$error, call), "The training", training, count_of(training$steps, "step"),
+      "gym_error_training", call,
+      if (!is.null(files$checkpoint)) "After a fix, the same call goes on from the checkpoint."
+    )
+  }
+  training
+}
+
+# A function that shows the last row of the table that the child writes, and copies it to the log.
+sb3_poll <- function(folder, log, show) {
+  table <- file.path(folder, "progress.csv")
+  read <- -Inf
+  function() {
+    changed <- as.numeric(file.mtime(table))
+    if (is.na(changed) || changed <= read) {
+      return()
+    }
+    read <<- changed
+    # The child may be writing it.
+    rows <- tryCatch(sb3_progress(folder), error = function(cnd) NULL)
+    if (NROW(rows)) show(rows[nrow(rows), ])
+    if (!is.null(log)) file.copy(table, log, overwrite = TRUE)
+  }
+}
+
+sb3_job <- function(settings, keeps) {
+  job <- settings[c("algorithm", "policy", "total_steps", "num_envs", "device", "eval_every")]
+  objects <- lapply(settings[c("env_kwargs", "arguments")], function(values) {
+    if (length(values)) values else rlang::set_names(list())
+  })
+  c(job, objects, list(
+    task = "train", env_id = settings$env, seed = settings$seed, normalize = settings$normalize,
+    eval_episodes = settings$eval_episodes_curve, checkpoint = keeps
+  ))
+}
+
+# What makes a training another one. The budget and the evaluations may differ.
+of_sb3_training <- c("algorithm", "policy", "num_envs", "env_kwargs", "arguments", "env_id",
+                     "normalize")
+
+go_on_or_begin <- function(job, folder, files, call) {
+  begun <- if (!is.null(files$checkpoint) && files$resume) sb3_state(folder)
+  if (is.null(begun)) {
+    unlink(file.path(folder, c("checkpoint", "checkpoint-old", "checkpoint-new")), recursive = TRUE)
+  } else {
+    before <- read_json_file(file.path(folder, "job.json"))
+    now <- from_json(to_json(job))
+    differ <- Filter(function(name) !identical(before[[name]], now[[name]]), of_sb3_training)
+    if (length(differ)) {
+      gym_abort(
+        c(paste0("The training in \"", folder, "\" had another value of ", quoted_names(differ),
+                 "."),
+          i = "Give another folder, or `resume = FALSE` to start again."),
+        class = "gym_error_checkpoint", call = call
+      )
+    }
+    cli::cli_inform(
+      c(i = "Going on after {begun$num_timesteps} steps."), class = "gym_message_resumed"
+    )
+  }
+  sb3_forget_later(folder)
+}
+
+# The whole log in the form of every training's.
+log_sb3 <- function(training, settings, folder, call) {
+  rows <- function(table) lapply(seq_len(nrow(table)), function(i) as.list(table[i, ]))
+  state <- list(
+    history = rows(training$history), evaluations = rows(training$evaluations),
+    agent = training$agent, iteration = nrow(training$history)
+  )
+  settings[c("env_id", "kwargs", "provenance")] <- training[c("env_id", "kwargs", "provenance")]
+  settings$policy <- training$policy
+  training_log(folder, settings, state, call)
+}

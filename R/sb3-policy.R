@@ -1,0 +1,99 @@
+# Policies that Stable-Baselines3 trained, as networks of this package.
+
+#' Make a policy of what a job of Stable-Baselines3 has written
+#' @param folder The job's folder.
+#' @return A [policy_network()] that is not bound yet.
+#' @noRd
+sb3_policy <- function(folder) {
+  file <- file.path(folder, "policy.safetensors")
+  read <- read_tensors(readBin(file, "raw", file.size(file)))
+  about <- from_json(read$metadata$about)
+  layers <- read$tensors[grep("^layer ", names(read$tensors))]
+  weights <- unname(layers[order(as.integer(sub("layer ", "", names(layers))))])
+  policy <- policy_network(
+    c(ncol(weights[[1L]]) - 1L, vapply(weights, nrow, 0L)), unlist(about$activation), weights,
+    bias = TRUE, output = about$output, log_std = read$tensors$log_std %||% 0,
+    clip_obs = about$clip_obs %||% 10
+  )
+  if (!is.null(about$count)) {
+    # Stable-Baselines3 divides by the root of the variance and a small number; ours by that of
+    # the squares over the count less one.
+    count <- max(about$count, 2)
+    variance <- read$tensors$variance
+    policy$moments <- new_moments(count, read$tensors$mean, variance * (count - 1))
+  }
+  policy
+}
+
+#' @rdname as_policy
+#' @param activation For a zip file of Stable-Baselines3: PyTorch's name of the activation of the
+#'   hidden layers, such as `"ReLU"`. `NULL`, the default, is the one that the file names in plain
+#'   text, or the algorithm's default.
+#' @param moments For such a file: how the observations were normalised in training (by
+#'   `VecNormalize`), a list of the numeric vectors `mean` and `variance`, and optionally of the
+#'   numbers `clip_obs` (10 by default) and `epsilon` (1e-8). `FALSE` if they were not. The default,
+#'   `NULL`, is the same, but an error if a file `vecnormalize.pkl` is beside the zip file.
+#' @export
+as_policy.character <- function(x, ..., activation = NULL, moments = NULL) {
+  check_dots_empty(...)
+  call <- rlang::current_env()
+  check_string(x)
+  check_string(activation, allow_null = TRUE)
+  if (!file.exists(x)) abort_argument(x, "a file that exists", "x", call)
+  check_no_pickle(x, call)
+  check_moments(moments, x, call)
+  folder <- temporary_file("gym-sb3-")
+  dir.create(folder)
+  on.exit(unlink(folder, recursive = TRUE))
+  moments <- if (is.list(moments)) {
+    c(lapply(moments[c("mean", "variance")], as.list), moments[c("clip_obs", "epsilon")])
+  }
+  job <- list(
+    task = "convert", file = absolute_path(x), activation = activation,
+    moments = Filter(Negate(is.null), moments)
+  )
+  if (!length(job$moments)) job["moments"] <- list(NULL)
+  result <- run_sb3_job(job, folder, sb3_python(call), call)
+  if (!is.null(result$error)) rlang::cnd_signal(sb3_error(result$error, call))
+  sb3_policy(folder)
+}
+
+check_no_pickle <- function(x, call) {
+  if (!grepl("[.](pkl|pickle|pt|pth)$", tolower(x))) {
+    return()
+  }
+  gym_abort(
+    c(paste0("\"", basename(x), "\" is a pickle, and is not loaded."),
+      x = paste("A pickle from elsewhere can run any program with your rights: read your files,",
+                "delete them, send them away."),
+      i = "`as_policy()` reads the zip file that `model.save()` makes, by its weights alone."),
+    class = "gym_error_argument", argument = "x", value = x, call = call
+  )
+}
+
+check_moments <- function(moments, x, call) {
+  if (is.null(moments)) {
+    name <- sub("[.]zip$", "", basename(x))
+    beside <- file.path(dirname(x), c("vecnormalize.pkl", file.path(name, "vecnormalize.pkl")))
+    if (any(file.exists(beside))) {
+      gym_abort(
+        c(paste0("This policy's observations were normalised: there is ",
+                 beside[file.exists(beside)][[1L]], "."),
+          i = paste("That file is a pickle, which can run any program, and is not loaded. Give",
+                    "`moments = list(mean = , variance = )`: in Python they are `obs_rms.mean`",
+                    "and `obs_rms.var` of the VecNormalize."),
+          i = "`moments = FALSE` takes the policy without."),
+        class = "gym_error_argument", argument = "moments", call = call
+      )
+    }
+    return()
+  }
+  if (isFALSE(moments)) {
+    return()
+  }
+  numbers <- is.list(moments) && length(moments$mean) == length(moments$variance) &&
+    is.numeric(moments$mean) && is.numeric(moments$variance)
+  if (!numbers || !all(names(moments) %in% c("mean", "variance", "clip_obs", "epsilon"))) {
+    abort_argument(moments, "a list of `mean` and `variance`, or FALSE", "moments", call)
+  }
+}
