@@ -13,6 +13,10 @@ test_that("every preset makes its agent, and says where it comes from", {
   }
   ppo <- preset_agent(presets[presets$agent == "ppo" & presets$env_id == "CartPole-v1", ])
   expect_equal(ppo$learning_rate(c(0, 5e4, 1e5)), c(1e-3, 5e-4, 0))
+  pendulum <- agent_presets("Pendulum-v1")
+  expect_identical(
+    from_json(pendulum$arguments[pendulum$agent == "SAC"]), list(learning_rate = 0.001)
+  )
   swimmer <- agent_presets("Swimmer-v5")
   expect_identical(unique(swimmer$env_id), "Swimmer-v5")
   expect_identical(nrow(agent_presets("None-v0")), 0L)
