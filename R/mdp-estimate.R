@@ -8,6 +8,8 @@
 #'   `episode` and `step` tell which rows are the first of an episode, where episodes start. Without
 #'   `step` the rows of each episode must be in order. Without both, an episode goes on in the next
 #'   row until it is terminated.
+#'   Or the result of [steps_data()], whose states and actions keep their names. A step that ends an
+#'   episode without a known next state then leads back to its own state.
 #' @param ... For methods.
 #' @return A model, see [gym_model()]. Its states and actions are all of the environment's, if the
 #'   rollout's policy knows them, and otherwise those from the lowest to the highest number in the
@@ -34,6 +36,9 @@ estimate_model.default <- function(x, ...) {
 #' @export
 estimate_model.gym_rollout <- function(x, ...) {
   steps <- x$steps
+  # The spaces of the environment, if the policy has them; a function does not.
+  spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
+  if (is.data.frame(steps)) steps <- steps_by_number(steps, spaces, rlang::current_env())
   after <- grep("^next_", names(steps), value = TRUE)
   if (!is.data.frame(steps) || !length(after)) {
     gym_abort(
@@ -55,8 +60,6 @@ estimate_model.gym_rollout <- function(x, ...) {
     next_state = steps[[after]], reward = steps$reward,
     terminated = steps$terminated
   )
-  # The spaces of the environment, if the policy has them; a function does not.
-  spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
   attr(table, "spaces") <- spaces
   model <- estimate_model(table)
   model$spec$id <- paste(x$env_id, "(estimated)")
@@ -83,9 +86,26 @@ estimate_model.data.frame <- function(x, ...) {
   numbers <- state_numbers(states)
   starts <- tabulate(match(steps$state[first], numbers), length(numbers))
   new_model(
-    table, states, actions, stats::setNames(starts / sum(starts), numbers),
+    table, states, actions, stats::setNames(starts / sum(starts), value_labels(states)),
     list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
   )
+}
+
+# Named states and actions as their numbers.
+steps_by_number <- function(steps, spaces, call) {
+  columns <- names(spaces$observation_space$values)
+  after <- paste0("next_", columns, recycle0 = TRUE)
+  if (length(columns) && all(after %in% names(steps))) {
+    own <- spaces$observation_space
+    state <- encoded_values(own, steps, "state", call)
+    next_state <- encoded_values(own, stats::setNames(steps[after], columns), "state", call)
+    steps <- steps[setdiff(names(steps), c(columns, after))]
+    steps[c("state", "next_state")] <- list(state, next_state)
+  }
+  if (!is.null(spaces$action_space$values)) {
+    steps$action <- encoded_values(spaces$action_space, steps$action, "action", call)
+  }
+  steps
 }
 
 # The rows of the first steps of episodes.

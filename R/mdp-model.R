@@ -13,14 +13,21 @@
 #' columns of matrices and vectors start at 1, as always in R: the first row belongs to the lowest
 #' number.
 #'
+#' States and actions may also have names: text or factors, or several columns for the states, such
+#' as `row` and `column`. In play each is then a number from 0, in the order of the levels, or of
+#' the columns; results, tables and pictures show the names. [policy_table()] and others are asked
+#' by name, too: `predict(solution, "low")`.
+#'
 #' @param transitions A data frame with a row for each transition and the columns `state`, `action`
-#'   and `next_state` (whole numbers), `reward` (a number), and optionally `probability` (default 1)
-#'   and `terminated` (whether the episode ends there; by default `TRUE` if no row leaves
-#'   `next_state`). An action without a row in a state is invalid there.
-#' @param start Where episodes start: a state's number, or several of them, which are equally
-#'   likely; or probabilities, with the states' numbers as names, or one for each state. (A vector
-#'   with as many elements as there are states has probabilities.) `NULL`, the default, draws
-#'   uniformly from the states that some row leaves.
+#'   and `next_state` (whole numbers, text or factors), `reward` (a number), and optionally
+#'   `probability` (default 1) and `terminated` (whether the episode ends there; by default `TRUE`
+#'   if no row leaves `next_state`). An action without a row in a state is invalid there.
+#' @param state The names of the columns of the state, strings. The default is `"state"`. Those of
+#'   the next state have `next_` before them.
+#' @param start Where episodes start: a state's number or name, or several of them, which are
+#'   equally likely; or probabilities, with the states' numbers or names as names, or one for each
+#'   state. (A vector with as many elements as there are states has probabilities.) `NULL`, the
+#'   default, draws uniformly from the states that some row leaves.
 #' @param id Its name in messages and titles, a string.
 #' @param max_episode_steps The number of steps after which an episode is cut off in play, a whole
 #'   number. `NULL`, the default, for no limit.
@@ -30,7 +37,7 @@
 #'   \describe{
 #'     \item{transitions}{A data frame with the columns `state`, `action`, `next_state` (integer),
 #'       `probability`, `reward` (double) and `terminated` (logical), sorted by state and action.
-#'       `as.data.frame()` returns it.}
+#'       `as.data.frame()` returns it with the names of states and actions.}
 #'     \item{start}{The probability that each state is the first one, a numeric vector with the
 #'       states' numbers as names.}
 #'     \item{observation_space, action_space}{The states and the actions, Discrete spaces.}
@@ -54,7 +61,7 @@
 #' machine
 #' solve_mdp(machine, discount = 0.95)
 gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_steps = NULL,
-                      reward_threshold = NULL) {
+                      reward_threshold = NULL, state = "state") {
   check_string(id)
   check_count(max_episode_steps, allow_null = TRUE)
   check_number(reward_threshold, allow_null = TRUE)
@@ -62,9 +69,10 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
     id = id, reward_threshold = reward_threshold,
     max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
   )
-  table <- check_transitions(transitions)
-  states <- spanned_space(c(table$state, table$next_state), "states")
-  actions <- spanned_space(table$action, "actions")
+  coded <- coded_transitions(transitions, state, rlang::current_env())
+  table <- check_transitions(coded$table)
+  states <- coded$states %||% spanned_space(c(table$state, table$next_state), "states")
+  actions <- coded$actions %||% spanned_space(table$action, "actions")
   new_model(table, states, actions, plain_numbers(start), spec)
 }
 
@@ -100,8 +108,8 @@ new_model <- function(table, states, actions, start, spec, call = rlang::caller_
           count_of(as.double(actions$n), "action")),
     call, "transitions", "Number states and actions without gaps."
   )
-  check_probabilities(table, call)
-  check_ends(table, call)
+  check_probabilities(table, states, actions, call)
+  check_ends(table, states, call)
   structure(
     list(
       transitions = table, start = start_probabilities(start, table, states, call),
@@ -148,14 +156,15 @@ check_is_model <- function(model, call = rlang::caller_env()) {
 # rounded.
 sum_tolerance <- 1e-6
 
-check_probabilities <- function(table, call) {
+check_probabilities <- function(table, states, actions, call) {
   pair <- paste(table$state, table$action)
   sums <- rowsum(table$probability, pair, reorder = FALSE)[, 1L]
   wrong <- which(abs(sums - 1) > sum_tolerance)
   if (length(wrong)) {
     at <- strsplit(names(sums)[[wrong[[1L]]]], " ", fixed = TRUE)[[1L]]
     gym_abort(
-      c(paste0("The probabilities of action ", at[[2L]], " in state ", at[[1L]], " add up to ",
+      c(paste0("The probabilities of action ", named_numbers(actions, as.integer(at[[2L]])),
+               " in state ", named_numbers(states, as.integer(at[[1L]])), " add up to ",
                format(sums[[wrong[[1L]]]], digits = 10), ", not to 1."),
         i = if (length(wrong) > 1L) {
           paste0("The same holds for ", count_of(length(wrong) - 1, "further pair"),
@@ -166,10 +175,10 @@ check_probabilities <- function(table, call) {
   }
 }
 
-check_ends <- function(table, call) {
+check_ends <- function(table, states, call) {
   stuck <- !table$terminated & table$probability > 0 & !table$next_state %in% table$state
   if (any(stuck)) {
-    state <- table$next_state[stuck][[1L]]
+    state <- named_numbers(states, table$next_state[stuck][[1L]])
     gym_abort(
       c(paste0("No row leaves state ", state, ", and arriving there does not end the episode."),
         i = "Set `terminated` to TRUE in the rows that lead there, or add rows that leave it."),
@@ -180,12 +189,14 @@ check_ends <- function(table, call) {
 
 start_probabilities <- function(start, table, states, call) {
   numbers <- state_numbers(states)
+  labels <- value_labels(states)
   left <- numbers %in% table$state
   given <- start
+  if (is.character(start) || is.factor(start)) start <- encoded_values(states, start, "state", call)
   if (is.null(start)) {
     start <- left / sum(left)
   } else if (!is.null(names(start))) {
-    places <- match(names(start), numbers)
+    places <- match(names(start), labels)
     known <- !anyNA(places) && !anyDuplicated(places)
     start <- if (known) replace(numeric(length(numbers)), places, unname(start))
   } else if (is_number(start) || length(start) != length(numbers)) {
@@ -201,9 +212,9 @@ start_probabilities <- function(start, table, states, call) {
   }
   if (any(start[!left] > 0)) {
     must <- "the number of a state that some row leaves"
-    abort_argument(numbers[!left & start > 0][[1L]], must, "start", call)
+    abort_argument(labels[!left & start > 0][[1L]], must, "start", call)
   }
-  stats::setNames(as.double(start), numbers)
+  stats::setNames(as.double(start), labels)
 }
 
 # Methods -----------------------------------------------------------------------------
@@ -222,7 +233,9 @@ print.gym_model <- function(x, ...) {
 }
 
 #' @export
-as.data.frame.gym_model <- function(x, row.names = NULL, optional = FALSE, ...) x$transitions
+as.data.frame.gym_model <- function(x, row.names = NULL, optional = FALSE, ...) {
+  named_transitions(x)
+}
 
 # As arrays ----------------------------------------------------------------------------
 
@@ -264,7 +277,7 @@ model_arrays <- function(model) {
   from <- state_rows(model, table$state)
   to <- ifelse(table$terminated, states + 1L, state_rows(model, table$next_state))
   action <- action_columns(model, table$action)
-  name <- list(c(names(model$start), "end"), as.character(state_numbers(model$action_space)))
+  name <- list(c(names(model$start), "end"), value_labels(model$action_space))
   p <- array(0, c(states + 1L, states + 1L, actions), name[c(1L, 1L, 2L)])
   sums <- rowsum(table$probability, from + (states + 1) * (to - 1 + (states + 1) * (action - 1)))
   p[as.double(rownames(sums))] <- sums

@@ -7,6 +7,11 @@
 #' @noRd
 policy_matrix <- function(policy, model, call) {
   possible <- possible_actions(model)
+  if ((is.character(policy) || is.factor(policy)) && !is.null(model$action_space$values)) {
+    policy <- stats::setNames(
+      encoded_values(model$action_space, policy, "action", call), names(policy)
+    )
+  }
   policy <- plain_numbers(policy, "policy", call)
   if (is.numeric(policy)) policy <- in_model_order(policy, model, call)
   probabilities <- if (is.matrix(policy) && is.numeric(policy)) {
@@ -23,8 +28,8 @@ policy_matrix <- function(policy, model, call) {
   if (any(barred & rowSums(possible) > 0)) {
     at <- which(barred & rowSums(possible) > 0, arr.ind = TRUE)[1L, ]
     gym_abort(
-      paste0("The policy takes action ", state_numbers(model$action_space)[[at[[2L]]]],
-             " in state ", state_numbers(model$observation_space)[[at[[1L]]]],
+      paste0("The policy takes action ", value_labels(model$action_space)[[at[[2L]]]],
+             " in state ", value_labels(model$observation_space)[[at[[1L]]]],
              ", where the model does not have that action."),
       class = "gym_error_argument", argument = "policy", value = policy, call = call
     )
@@ -47,7 +52,7 @@ in_model_order <- function(policy, model, call) {
   if (!is.matrix(policy)) {
     return(unname(policy[order_of(names(policy), list(states), "states", FALSE)]))
   }
-  actions <- as.character(state_numbers(model$action_space))
+  actions <- value_labels(model$action_space)
   meaning <- action_meaning(model$spec$id, length(actions))
   row <- order_of(rownames(policy), list(states), "states", TRUE)
   column <- order_of(colnames(policy), list(actions, meaning), "actions", is.null(meaning))

@@ -47,11 +47,12 @@
 #' @return An object of class `gym_solution`, with methods for [print()], [as.data.frame()],
 #'   [predict()] and [plot()][plot.gym_solution()]. It is a list with the elements
 #'   \describe{
-#'     \item{values}{The value of each state, a numeric vector with the states' numbers as names;
-#'       with a horizon, before its first step.}
+#'     \item{values}{The value of each state, a numeric vector with the states' numbers or names as
+#'       names; with a horizon, before its first step.}
 #'     \item{q}{The value of each action in each state, a matrix with a row for each state and a
 #'       column for each action; `-Inf` for an invalid action.}
-#'     \item{actions}{The numbers of the best actions, an integer vector; with a horizon a matrix
+#'     \item{actions}{The numbers of the best actions, an integer vector (`as.data.frame()` has
+#'       their names, if they have some); with a horizon a matrix
 #'       with a column for each step, in order. `NA` for a terminal state, or another one without
 #'       actions. `NULL` for a given policy.}
 #'     \item{policy}{The best policy, a [policy_table()], or the given one. `NULL` with a horizon,
@@ -176,7 +177,7 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   structure(
     list(
       values = stats::setNames(found$values, names(model$start)),
-      q = array(q, dim(q), list(names(model$start), state_numbers(model$action_space))),
+      q = array(q, dim(q), list(names(model$start), value_labels(model$action_space))),
       actions = actions, policy = if (is.null(horizon)) policy,
       start_value = start_mean(model, found$values), limited = limited,
       trace = if (!is.null(notes$trace)) do.call(rbind, notes$trace),
@@ -236,10 +237,11 @@ solution_meaning <- function(x) {
 
 #' @export
 as.data.frame.gym_solution <- function(x, row.names = NULL, optional = FALSE, ...) {
+  numbers <- if (is.null(x$actions)) NA_integer_ else as.matrix(x$actions)[, 1L]
   data.frame(
-    state = state_numbers(x$model$observation_space), value = unname(x$values),
-    action = if (is.null(x$actions)) NA_integer_ else as.matrix(x$actions)[, 1L],
-    row.names = row.names
+    all_values(x$model$observation_space), value = unname(x$values),
+    action = named_numbers(x$model$action_space, numbers), row.names = row.names,
+    check.names = FALSE
   )
 }
 

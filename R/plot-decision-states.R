@@ -54,7 +54,7 @@ new_state_map <- function(place, in_play, call) {
   structure(
     list(
       grid = data.frame(state = states, action = actions), x = "state", kind = "state",
-      action_space = place$action_space, env_id = place$env_id,
+      observation_space = space, action_space = place$action_space, env_id = place$env_id,
       wrappers = place$wrappers, policy = place$policy
     ),
     class = c("gym_state_map", "gym_decision_map")

@@ -218,14 +218,16 @@ state_map_data <- function(x, columns, directions, passenger, destination,
   cells <- x$grid
   known <- known_grid(x$env_id %||% "")
   numbers <- state_numbers(x$action_space)
-  directions <- action_directions(directions, known, numbers, call)
+  directions <- action_directions(directions, known, value_labels(x$action_space), call)
   cells$does <- directions[match(cells$action, numbers)]
   labels <- action_names(x$env_id, length(numbers), numbers[[1L]])
   cells$ink <- "black"
   side <- sqrt(nrow(cells))
   own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
-  placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call)
-  c(placed, list(directions = directions, numbers = numbers, labels = labels))
+  placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call,
+                         x$observation_space$values)
+  c(placed, list(directions = directions, numbers = numbers, labels = labels,
+                 states = x$observation_space))
 }
 
 # The parts on the axes are the columns and the rows; `panels` are those of the other parts that

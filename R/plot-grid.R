@@ -3,6 +3,9 @@
 # A picture of cells with the columns `row` and `column`. `layers` are below the environment's
 # marks. Parts of an observation have axes, and panels for the others.
 grid_picture <- function(data, layers) {
+  if (!is.null(data$axes)) {
+    return(named_grid_picture(data, layers))
+  }
   picture <- ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) + layers
   if (isTRUE(data$has_axes)) {
     return(
@@ -105,24 +108,69 @@ known_grid <- function(id) {
   if (length(found)) found else ""
 }
 
-# What the actions of these numbers are called: as it was said, as in the known grid, or by number.
-action_directions <- function(directions, known, numbers, call) {
+# What actions are called: as it was said, as in the known grid, or by their names or numbers.
+action_directions <- function(directions, known, labels, call) {
   directions <- directions %||% known_directions[[known]]
-  count <- length(numbers)
+  count <- length(labels)
   if (!is.null(directions) && (!is.character(directions) || length(directions) != count)) {
     must <- paste("a string for each of", count_of(count, "action"))
     abort_argument(directions, must, "directions", call)
   }
-  directions %||% as.character(numbers)
+  directions %||% as.character(labels)
 }
 
 # Puts states into Taxi's city, or into a grid of so many columns.
-place_states <- function(cells, known, columns, own_columns, passenger, destination, walls, call) {
+place_states <- function(cells, known, columns, own_columns, passenger, destination, walls, call,
+                         values = NULL) {
+  if (length(values) > 1L && is.null(columns)) {
+    return(cells_by_name(cells, values))
+  }
   if (known == "Taxi" && is.null(columns)) {
     taxi_cells(cells, passenger, destination, walls, call)
   } else {
     grid_cells(cells, columns %||% own_columns, call)
   }
+}
+
+# The first column of names goes down, the second to the right, and others make panels.
+cells_by_name <- function(cells, values) {
+  axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))
+  cells$row <- match(values[[1L]], axes[[1L]])
+  cells$column <- match(values[[2L]], axes[[2L]])
+  panels <- names(values)[-(1:2)]
+  cells[panels] <- values[panels]
+  list(
+    cells = cells, rows = length(axes[[1L]]), columns = length(axes[[2L]]), axes = axes,
+    panels = panels
+  )
+}
+
+named_grid_picture <- function(data, layers) {
+  at <- lapply(data$axes, seq_along)
+  ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
+    layers +
+    ggplot2::scale_x_continuous(
+      breaks = at[[2L]], labels = as.character(data$axes[[2L]]), expand = c(0.01, 0)
+    ) +
+    ggplot2::scale_y_reverse(
+      breaks = at[[1L]], labels = as.character(data$axes[[1L]]), expand = c(0.01, 0)
+    ) +
+    (if (length(data$panels)) ggplot2::facet_wrap(data$panels, labeller = ggplot2::label_both)) +
+    ggplot2::coord_fixed() +
+    ggplot2::labs(x = names(data$axes)[[2L]], y = names(data$axes)[[1L]]) +
+    theme_gym() +
+    ggplot2::theme(panel.grid = ggplot2::element_blank())
+}
+
+# The axis of states without a grid, with their names.
+state_axis <- function(space, ...) {
+  if (is.null(space$values)) {
+    return(ggplot2::scale_x_continuous(breaks = few_breaks, ...))
+  }
+  ggplot2::scale_x_continuous(
+    breaks = state_numbers(space), labels = value_labels(space),
+    guide = ggplot2::guide_axis(check.overlap = TRUE), ...
+  )
 }
 
 # Puts states into rows and columns, if the number of columns is known.

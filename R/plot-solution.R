@@ -16,6 +16,9 @@
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
 #'
+#' States with two columns of names, such as `row` and `column`, are a grid of these: the first
+#' down, the second to the right. Each value of further columns has a panel.
+#'
 #' @inheritParams plot.gym_rollout
 #' @param x,object The result of [solve_mdp()].
 #' @param type What to show, a string: `"values"`, the default, of states; or `"q"`, of actions.
@@ -83,13 +86,15 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
                                call = rlang::caller_env()) {
   check_count(columns, allow_null = TRUE, call = call)
   check_count(step, max = x$horizon %||% 1, call = call)
-  cells <- as.data.frame(x)
-  if (is.matrix(x$actions)) cells$action <- x$actions[, step]
+  cells <- data.frame(
+    state = state_numbers(x$model$observation_space), value = unname(x$values),
+    action = if (is.null(x$actions)) NA else as.matrix(x$actions)[, step]
+  )
   numbers <- state_numbers(x$model$action_space)
   if (inherits(x$policy, "gym_policy_table")) cells$action <- numbers[best_column(x$policy$q)]
   cells$action[row_max(x$q) == -Inf] <- NA
   known <- known_grid(x$model$spec$id)
-  directions <- action_directions(directions, known, numbers, call)
+  directions <- action_directions(directions, known, value_labels(x$model$action_space), call)
   kinds <- state_kinds(x$model)
   cells$end <- end_kinds(x$model, kinds)
   cells$value[!kinds$reached] <- NA
@@ -97,12 +102,13 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
   placed <- place_states(
     cells, known, columns, if (known != "") grid_columns(x$model), passenger, destination,
-    taxi_walls(x$model), call
+    taxi_walls(x$model), call, x$model$observation_space$values
   )
   placed$cells$ink <- ink_on(placed$cells$value)
   placed$cells$text <- number_texts(placed$cells$value)
   labels <- action_names(x$model$spec$id, length(numbers), numbers[[1L]])
-  c(placed, list(directions = directions, numbers = numbers, labels = labels))
+  c(placed, list(directions = directions, numbers = numbers, labels = labels,
+            states = x$model$observation_space))
 }
 
 #' Find the states that episodes go through and those in which they end
@@ -267,7 +273,7 @@ value_points <- function(data) {
       )
     }) +
     key_of_marks(there) +
-    ggplot2::scale_x_continuous(breaks = few_breaks) +
+    state_axis(data$states) +
     ggplot2::scale_y_continuous(breaks = few_breaks) +
     ggplot2::labs(x = "state", y = if (!nrow(taken)) "value") +
     theme_gym()
@@ -297,7 +303,7 @@ state_axes <- function(data) {
   few <- length(data$numbers) <= most_named_actions
   names <- ifelse(data$directions == data$numbers, data$labels, data$directions)
   list(
-    ggplot2::scale_x_continuous(breaks = few_breaks),
+    state_axis(data$states),
     ggplot2::scale_y_continuous(
       breaks = if (few) data$numbers else few_breaks,
       labels = if (few) broken_texts(names, 24) else ggplot2::waiver()

@@ -61,16 +61,23 @@ check_in_order <- function(q, call = rlang::caller_env()) {
 
 #' @export
 act.gym_policy_table <- function(policy, observation, ...) {
+  by_name <- !is.null(states_of(policy)$values) && !is.numeric(observation)
+  if (by_name) observation <- encoded_values(states_of(policy), observation, "state", NULL)
   observed <- observed_batch(observation, states_of(policy))
-  act_batch(policy, observed$batch, observed$n, NULL)
+  actions <- act_batch(policy, observed$batch, observed$n, NULL)
+  # Whoever asks by name is answered by name.
+  if (by_name) named_numbers(policy$action_space, actions) else actions
 }
 
 #' @exportS3Method
 predict_policy.gym_policy_table <- function(policy, newdata, type, call = rlang::caller_env()) {
-  observed <- observed_batch(newdata, states_of(policy), "newdata", call)
   if (type == "action") {
-    return(act_batch(policy, observed$batch, observed$n, NULL))
+    return(act(policy, newdata))
   }
+  if (!is.null(states_of(policy)$values) && !is.numeric(newdata)) {
+    newdata <- encoded_values(states_of(policy), newdata, "state", call)
+  }
+  observed <- observed_batch(newdata, states_of(policy), "newdata", call)
   # The output is a value for each action.
   rows <- table_rows(policy, observed$batch, observed$n)
   if (type == "probability") row_probabilities(policy, rows) else rows

@@ -102,9 +102,13 @@ state_numbers <- function(space) seq.int(as.integer(space$start), length.out = a
 
 #' List all values of a countable space
 #' @return A data frame with a row for each, in the order of its numbers, and a column for each
-#'   number of a value, named by its part: `state` for a Discrete space.
+#'   number of a value, named by its part: `state` for a Discrete space, or the columns of its
+#'   names.
 #' @noRd
 all_values <- function(space) {
+  if (!is.null(space$values)) {
+    return(space$values)
+  }
   columns <- digit_values(space)
   if (inherits(space, "gym_space_discrete")) {
     names(columns) <- "state"

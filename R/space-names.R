@@ -62,6 +62,9 @@ naming_of_parts <- function(parts, labels) {
 #' @return A named list of columns.
 #' @noRd
 observation_columns <- function(space, values) {
+  if (!is.null(space$values)) {
+    return(as.list(decoded_values(space, values)))
+  }
   columns <- value_columns(space, values, "obs")
   names(columns) <- if (is_stackable(space)) {
     number_names(space, length(columns))
@@ -118,7 +121,7 @@ value_columns.gym_space_array <- function(space, values, name) {
 
 #' @exportS3Method
 value_columns.gym_space_discrete <- function(space, values, name) {
-  stats::setNames(list(values), name)
+  stats::setNames(list(named_numbers(space, values)), name)
 }
 
 #' @exportS3Method
