@@ -9,6 +9,8 @@
 #' | `"epsilon_greedy"` | the largest mean reward so far; any with probability `epsilon` | 2.2 |
 #' | `"ucb"` | the largest upper confidence bound | 2.7 |
 #' | `"gradient"` | drawn by a softmax of preferences | 2.8 |
+#' | `"linucb"` | the largest upper confidence bound of a linear model of the context | Li 2010 |
+#' | `"thompson"` | the best by a draw from the posterior of such a model | Agrawal and Goyal 2013 |
 #'
 #' The upper confidence bound of an arm that was taken `n` times in `t` steps is its mean reward
 #' plus `confidence` times `sqrt(log(t) / n)`. Each arm is taken once first. Preferences rise with
@@ -16,11 +18,23 @@
 #'
 #' Ties are broken at random.
 #'
-#' @param env A bandit made by [bandit()].
+#' # Contexts and logged data
+#'
+#' `"linucb"` and `"thompson"` learn from logged steps, which have a context (the state), an action
+#' and a reward each: every action has a linear model of the context (with a ridge of 1). The data is
+#' replayed (Li 2011): in each row the learner sees the context and chooses; only if it chooses the
+#' action of the data it sees the reward, and learns. If the data's actions were drawn with equal
+#' probabilities, the rewards that it saw are those that it would have got, on average. With the
+#' column `probability`, a row is used with a probability proportional to its inverse, which makes
+#' the rest as if all actions had been equally likely.
+#'
+#' @param env A bandit made by [bandit()]; or logged steps for a method with contexts, as for
+#'   [learn_fitted_q()].
 #' @param method The method, a string.
 #' @param epsilon The probability of exploring, a number from 0 to 1. The default is 0.1.
-#' @param confidence How much `"ucb"` favours arms that were seldom taken, a number of at least 0.
-#'   The default is 2.
+#' @param confidence How much `"ucb"` and `"linucb"` favour arms that were seldom taken, and the
+#'   standard deviation of a reward for `"thompson"`, a number of at least 0. The default is 2, and
+#'   1 with contexts.
 #' @param learning_rate How far a value or a preference moves towards its target, a number above 0.
 #'   `NULL`, the default, uses the mean of all rewards, and 0.1 for `"gradient"`.
 #' @param initial The first value of all arms, a number. The default is 0. With a constant
@@ -37,9 +51,18 @@
 #'   learners that took an arm with the largest mean reward, from 0 to 1); `values`, a matrix with a
 #'   row for each learner and a column for each arm, holding the final values or preferences; and
 #'   `label`, `learners` and `seed`.
+#'
+#'   From logged data it is one learner. `curve` then has a row for each step that it saw, with the
+#'   mean of all rewards until then, and there are the further elements `reward` and `se` (the mean
+#'   of the rewards that it saw, and its standard error), `seen` and `rows` (their number, and that
+#'   of the data's rows), and `policy`, which takes the best action by the final models.
 #' @section Errors: `gym_error_argument`.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
-#'   edition, MIT Press, chapter 2.
+#'   edition, MIT Press, chapter 2. L. Li, W. Chu, J. Langford, R. Schapire (2010), A
+#'   contextual-bandit approach to personalized news article recommendation, WWW. L. Li et al.
+#'   (2011), Unbiased offline evaluation of contextual-bandit-based news article recommendation
+#'   algorithms, WSDM. S. Agrawal, N. Goyal (2013), Thompson sampling for contextual bandits with
+#'   linear payoffs, ICML.
 #' @export
 #' @examples
 #' testbed <- bandit(arms = 10)
@@ -47,14 +70,32 @@
 #' explores <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
 #' explores
 #' plot(greedy, explores)
-learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient"), epsilon = 0.1,
-                         confidence = 2, learning_rate = NULL, initial = 0, baseline = TRUE,
+#'
+#' # Logged clicks, and what a learner would have made of them.
+#' set.seed(1)
+#' clicks <- data.frame(episode = 1:2000, age = runif(2000), action = sample(0:1, 2000, TRUE))
+#' clicks$reward <- rbinom(2000, 1, ifelse(clicks$action == 1, clicks$age, 0.5))
+#' learn_bandit(clicks, "linucb", seed = 1)
+learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient", "linucb",
+                                         "thompson"), epsilon = 0.1, confidence = NULL, learning_rate = NULL, initial = 0, baseline = TRUE,
                          learners = 2000, horizon = NULL, seed = NULL) {
+  contextual <- c("linucb", "thompson")
+  if (method[1L] %in% contextual) {
+    check_number(confidence, min = 0, allow_null = TRUE)
+    check_seed(seed)
+    return(replay_bandit(env, method[1L], confidence %||% 1, seed %||% draw_seed(),
+                         rlang::current_env()))
+  }
+  confidence <- confidence %||% 2
   problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
   if (is.null(problem)) {
-    abort_argument(env, "a bandit made by `bandit()`", "env", rlang::current_env())
+    hint <- if (is.data.frame(env)) {
+      "From logged data `method = \"linucb\"` and `\"thompson\"` learn."
+    }
+    abort_argument(env, "a bandit made by `bandit()`", "env", rlang::current_env(), hint)
   }
-  method <- check_choice(method[1L], c("epsilon_greedy", "ucb", "gradient"), arg = "method")
+  choices <- c("epsilon_greedy", "ucb", "gradient", contextual)
+  method <- check_choice(method[1L], choices, arg = "method")
   check_number(epsilon, min = 0, max = 1)
   check_number(confidence, min = 0)
   if (!is.null(learning_rate)) check_above_zero(learning_rate)
@@ -147,6 +188,15 @@ bandit_text <- function(rule, initial) {
 
 #' @export
 print.gym_bandit_learning <- function(x, ...) {
+  if (!is.null(x$policy)) {
+    cat(
+      paste0("A learner in logged data: ", x$label),
+      paste0("It saw ", count_of(x$seen, "step"), " of ", whole_number_text(x$rows),
+             ": mean reward ", number_text(x$reward), se_text(x$se)),
+      sep = "\n"
+    )
+    return(invisible(x))
+  }
   last <- utils::tail(x$curve, 100L)
   cat(
     paste0(count_of(x$learners, "learner"), " in ", x$env_id, ": ", x$label),

@@ -44,12 +44,16 @@
 #'   For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
+#'   For `learn_q()` also logged steps, as for [learn_fitted_q()]: it then sweeps over all pairs of a
+#'   state and an action that the data has until no value changes (batch Q-learning), and takes only
+#'   `discount`, `double` and `iterations`, the largest number of sweeps.
 #' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
 #'   `total_steps`, of which one is needed without a preset, `episodes` (in an iteration, 10 by
 #'   default), `target` or `seed`; and of the environment, such as `is_slippery = FALSE`.
 #' @return `agent_q()` returns an agent of class `gym_agent_q`. `learn_q()` makes this agent, trains
 #'   it and returns the result of [train_agent()]. Its `$policy` takes the action with the largest
-#'   value, and [state_values()] returns the values.
+#'   value, and [state_values()] returns the values. From data it returns a policy, as
+#'   [learn_fitted_q()] does.
 #' @section Errors: `gym_error_argument` for an invalid argument, actions that are not Discrete, or
 #'   observations that do not fit a table.
 #' @references C. Watkins (1989), Learning from Delayed Rewards, PhD thesis, Cambridge. H. van
@@ -249,5 +253,27 @@ format.gym_agent_q <- function(x, ...) {
 #' @rdname agent_q
 #' @export
 learn_q <- function(env, ...) {
+  if (is.data.frame(env) || inherits(env, "gym_rollout")) {
+    return(learn_q_from_data(env, list(...), rlang::current_env()))
+  }
   make_and_train("agent_q", env, ..., defaults = list(episodes = 10))
+}
+
+# Nobody acts while a table is learned from data, so most arguments have no meaning.
+learn_q_from_data <- function(data, given, call) {
+  unfit <- setdiff(rlang::names2(given), c("discount", "double", "iterations"))
+  if (length(unfit)) {
+    gym_abort(
+      c(paste0("From data `learn_q()` has no argument `", unfit[[1L]], "`."),
+        i = "It has `discount`, `double` and `iterations`."),
+      class = "gym_error_argument", argument = unfit[[1L]], call = call
+    )
+  }
+  discount <- given[["discount"]] %||% 0.99
+  double <- given[["double"]] %||% FALSE
+  iterations <- given[["iterations"]]
+  check_discount(discount, call = call)
+  check_flag(double, call = call)
+  check_count(iterations, allow_null = TRUE, call = call)
+  learn_table(data, discount, double, iterations, call)
 }

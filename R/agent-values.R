@@ -309,14 +309,16 @@ weights_policy <- function(agent, columns) {
 #' Get the learned values
 #'
 #' Return the values in the table (or by the features) of an agent that learned them.
-#' @param x The result of `learn_q()` and the like, or their agent.
+#' @param x The result of `learn_q()` and the like, or their agent; or a rule that was learned from
+#'   data.
 #' @param actions Return the value of each action? `FALSE`, the default, or `TRUE`.
 #' @return For Discrete observations, a numeric vector with an element for each state, named by its
 #'   number: the value of its best action, or, from [learn_td()], the value of the state. For
 #'   observations with several parts, such as Blackjack's, a data frame with a column for each part,
-#'   under its name, and `value`. With `actions = TRUE` a data frame with a row for each state and
-#'   action: the column `state`, or one for each part, `action` (its number) and `value`. States
-#'   that were never left, such as terminal ones, keep their first value.
+#'   under its name, and `value`. A rule from data has a data frame of the states of the data, with
+#'   the column `step` if it has a horizon. With `actions = TRUE` a data frame with a row for each
+#'   state and action: the column `state`, or one for each part, `action` (its number) and `value`.
+#'   States that were never left, such as terminal ones, keep their first value.
 #' @section Errors: `gym_error_argument` if `x` was not learned by a table or by features of
 #'   Discrete observations.
 #' @export
@@ -329,6 +331,9 @@ weights_policy <- function(agent, columns) {
 #' state_values(learned)
 state_values <- function(x, actions = FALSE) {
   check_flag(actions)
+  if (inherits(x, "gym_policy_fitted")) {
+    return(rule_state_values(x, actions))
+  }
   agent <- if (inherits(x, "gym_training")) x$agent else x
   space <- if (inherits(agent, "gym_value_learner")) agent$spaces$observation_space
   discrete <- inherits(space, "gym_space_discrete")
@@ -340,7 +345,8 @@ state_values <- function(x, actions = FALSE) {
   if (actions) {
     states <- all_values(space)
     row <- rep(seq_len(nrow(q)), each = ncol(q))
-    numbers <- state_numbers(agent$spaces$action_space)[seq_len(ncol(q))]
+    actions <- agent$spaces$action_space
+    numbers <- named_numbers(actions, state_numbers(actions)[seq_len(ncol(q))])
     return(data.frame(
       states[row, , drop = FALSE], action = rep(numbers, nrow(q)), value = as.vector(t(q)),
       row.names = NULL
@@ -352,8 +358,8 @@ state_values <- function(x, actions = FALSE) {
   } else {
     mean_values(q, row_probabilities(agent$learns, agent$learns$q))
   }
-  if (discrete) {
-    stats::setNames(values, state_numbers(space))
+  if (discrete && length(space$values) <= 1L) {
+    stats::setNames(values, value_labels(space))
   } else {
     data.frame(all_values(space), value = values)
   }

@@ -292,6 +292,10 @@ plot.gym_evaluation <- show_picture
 #' @export
 plot.gym_frame <- show_picture
 
+#' @rdname plot.gym_offline
+#' @export
+plot.gym_offline <- show_picture
+
 #' @rdname plot.gym_policy_network
 #' @export
 plot.gym_policy <- show_picture

@@ -9,8 +9,8 @@
 
 # The one list of the floors, from the top.
 floors <- list(
-  c("plot", "animate"), "sb3", "agent", "train", "mdp", "play", "policy", "env", "space", "client",
-  c("server", "install"), "http", "utils"
+  c("plot", "animate"), "sb3", "agent", "train", "data", "mdp", "play", "policy", "env", "space",
+  "client", c("server", "install"), "http", "utils"
 )
 
 # The package's help page and .onLoad() see the whole house.

@@ -87,7 +87,7 @@ test_that("what is no bandit, or no method, is refused", {
   refused(bandit(2, mean = 1:3), "`mean` must be a finite number for each of 2 arms")
   refused(bandit(sd = -1), "`sd` must be a number of at least 0")
   refused(learn_bandit("CartPole-v1"), "`env` must be a bandit")
-  refused(learn_bandit(bandit(), "thompson"), "one of \"epsilon_greedy\"")
+  refused(learn_bandit(bandit(), "exp3"), "one of \"epsilon_greedy\"")
   refused(learn_bandit(bandit(), epsilon = 2), "`epsilon` must be a number from 0 to 1")
 })
 
@@ -98,4 +98,47 @@ test_that("all learners of a plot may be named", {
   local_device()
   expect_identical(key_of(plot(never = greedy, sometimes = often)), c("never", "sometimes"))
   expect_identical(key_of(plot(greedy, sometimes = often)), c("epsilon 0", "sometimes"))
+})
+
+# Whether an action pays depends on age; actions are drawn with the probabilities p.
+logged_clicks <- function(n, p = c(0.5, 0.5)) {
+  data <- data.frame(episode = seq_len(n), age = stats::runif(n))
+  data$action <- sample(c("ad", "news"), n, replace = TRUE, prob = p)
+  pays <- ifelse(data$action == "ad", data$age, 1 - data$age)
+  data$reward <- stats::rbinom(n, 1, pays)
+  data$probability <- p[match(data$action, c("ad", "news"))]
+  data
+}
+
+test_that("learners with contexts learn from logged data", {
+  set.seed(1)
+  for (p in list(c(0.5, 0.5), c(0.8, 0.2))) {
+    data <- logged_clicks(3000, p)
+    for (method in c("linucb", "thompson")) {
+      learned <- learn_bandit(data, method, seed = 1)
+      expect_equal(predict(learned$policy, data.frame(age = c(0.1, 0.9))), c("news", "ad"))
+      # The best rule gets 0.75 a step.
+      expect_gt(learned$reward, 0.75 - 4 * learned$se - 0.03)
+      # Half of what is left of 3,000, or of 1,200, is of the chosen action.
+      expect_lt(abs(learned$seen - 3000 * min(p)), 150)
+    }
+  }
+  expect_identical(learn_bandit(data, "thompson", seed = 1), learned)
+  expect_output(print(learned), "mean reward")
+  expect_s3_class(ggplot2::autoplot(learned), "ggplot")
+})
+
+test_that("the models of LinUCB are ridge regressions", {
+  set.seed(1)
+  data <- logged_clicks(200)
+  data$action <- "ad"
+  data$probability <- 1
+  x <- cbind(1, data$age)
+  by_hand <- solve(diag(2) + crossprod(x), crossprod(x, data$reward))
+  expect_equal(unname(learn_bandit(data, "linucb")$values), by_hand, tolerance = 1e-10)
+})
+
+test_that("a replay needs logged data, and other methods a bandit", {
+  expect_error(learn_bandit(bandit(3), "linucb"), "logged steps")
+  expect_error(learn_bandit(logged_clicks(10), "ucb"), "\"linucb\"")
 })

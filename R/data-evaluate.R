@@ -1,0 +1,439 @@
+#' Evaluate a policy by data of another one
+#'
+#' Estimate the value of a policy from steps that somebody else took: the mean, over the starts of
+#' the data, of the discounted sum of rewards that the policy would get.
+#'
+#' # Methods
+#'
+#' All of them estimate the same value.
+#'
+#' | method | estimate | source |
+#' |---|---|---|
+#' | `"fqe"` | fitted Q evaluation: values of the policy by a regression | Le 2019 |
+#' | `"is"` | returns, weighted by how much likelier they are under the policy | Precup 2000 |
+#' | `"wis"` | the same, with weights that add up to 1 | Precup 2000 |
+#' | `"pdis"` | as `"is"`, with the weight of each decision until then | Precup 2000 |
+#' | `"dr"` | the regression, corrected by weighted residuals (doubly robust) | Jiang and Li 2016 |
+#' | `"wdr"` | the same, with weights that add up to 1 at each step | Thomas and Brunskill 2016 |
+#'
+#' Importance sampling needs the probabilities of the actions in the data, and is right if these
+#' are. Fitted Q evaluation needs a right regression. The doubly robust ones need one of the two.
+#' Their regression is fitted to other episodes than those which it corrects (five folds). Where
+#' episodes were cut off, what came after is not known: all methods with weights then need a
+#' `horizon` no longer than the shortest episode that was cut off.
+#'
+#' No method knows what influenced both actions and rewards and is not in the data (confounding).
+#'
+#' # Intervals
+#'
+#' Episodes are the unit. The bootstrap draws as many episodes as there are, with replacement,
+#' `replicates` times, and takes the percentiles of the estimates. `"fqe"` fits its regression again
+#' each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model of behavior is
+#' estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses the mean and the
+#' standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with known probabilities.
+#'
+#' @inheritParams learn_fitted_q
+#' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
+#'   as [policy_random()] or a [policy_table()]; a function of a data frame of states that returns
+#'   an action for each row, or a matrix with the probability of each action; or one action, which
+#'   is then always taken.
+#' @param method The methods, strings. The default is all of them.
+#' @param behavior How the actions of the data were chosen: a formula of the state, such as `~
+#'   severity + age`, for a logistic regression on these columns; or a policy as `policy`. `NULL`,
+#'   the default, uses the column `probability`, or if there is none the shares of actions in each
+#'   state where the state is countable, and otherwise a logistic regression on all columns.
+#' @param formula,model The regression of values, as for [learn_fitted_q()].
+#' @param level The level of the intervals, a number between 0 and 1. The default is 0.95.
+#' @param folds `NULL`, the default; or a number of folds for a policy that was learned from the
+#'   same data. It is learned again without the episodes of each fold and evaluated on these. The
+#'   result estimates the mean value of these rules.
+#' @param interval `"bootstrap"`, the default, or `"t"`.
+#' @param replicates The number of bootstrap replicates, a whole number. The default is 1,000.
+#' @param seed A whole number that fixes folds and replicates. `NULL`, the default, draws one from
+#'   the session's generator.
+#' @return An object of class `gym_offline`, with methods for [print()], [as.data.frame()] and
+#'   [plot()][plot.gym_offline()]. It is a list with the elements
+#'   \describe{
+#'     \item{estimates}{A data frame with a row for each method: `method`, `estimate`, `se`, `lower`
+#'       and `upper`. `as.data.frame()` returns it.}
+#'     \item{observed}{The same for the policy of the data, from its returns: `NA` without a horizon
+#'       if episodes were cut off.}
+#'     \item{weights}{The weight of each episode, the ratio of the probabilities of all its actions;
+#'       `NULL` for `"fqe"` alone.}
+#'     \item{effective}{The effective number of episodes, `sum(weights)^2 / sum(weights^2)`.}
+#'     \item{replicates}{A matrix with a row for each replicate and a column for each method, or
+#'       `NULL`.}
+#'     \item{episodes, steps, discount, horizon, level, folds, seed, model, behavior}{As given, or
+#'       what was used, in words.}
+#'   }
+#' @section Errors: `gym_error_argument` for invalid arguments, actions that the data never took,
+#'   cut episodes without a horizon, a policy that was learned from the same episodes, or fewer than
+#'   two episodes.
+#' @section Warnings: `gym_warning_offline` if the estimate depends on few episodes, or on actions
+#'   that the data never took in some states.
+#' @references N. Jiang, L. Li (2016), Doubly robust off-policy value evaluation for reinforcement
+#'   learning, ICML. H. Le, C. Voloshin, Y. Yue (2019), Batch policy learning under constraints,
+#'   ICML. D. Precup, R. Sutton, S. Singh (2000), Eligibility traces for off-policy policy
+#'   evaluation, ICML. P. Thomas, E. Brunskill (2016), Data-efficient off-policy policy evaluation
+#'   for reinforcement learning, ICML.
+#' @export
+#' @examples
+#' set.seed(1)
+#' visits <- data.frame(patient = 1:300, severity = runif(300),
+#'                      drug = sample(c("old", "new"), 300, replace = TRUE), p = 0.5)
+#' visits$wellbeing <- with(visits, ifelse(drug == "new", severity, 1 - severity)) + rnorm(300)
+#' steps <- steps_data(visits, "patient", "severity", "drug", "wellbeing", probability = "p")
+#' evaluated <- evaluate_offline(
+#'   steps, function(states) ifelse(states$severity > 0.5, "new", "old"), seed = 1
+#' )
+#' evaluated
+#' plot(evaluated)
+evaluate_offline <- function(data, policy, method = c("fqe", "is", "wis", "pdis", "dr", "wdr"),
+                             behavior = NULL, formula = NULL, model = NULL, discount = 1,
+                             horizon = NULL, stages = FALSE, level = 0.95, folds = NULL,
+                             interval = c("bootstrap", "t"), replicates = 1000, seed = NULL) {
+  call <- rlang::current_env()
+  steps <- steps_of(data, call)
+  method <- check_methods(method, call)
+  check_discount(discount)
+  check_horizon(horizon, stages, steps, call)
+  check_level(level)
+  interval <- check_choice(interval[1L], c("bootstrap", "t"), arg = "interval")
+  check_count(replicates, min = 2)
+  check_seed(seed)
+  check_many_episodes(steps, folds, call)
+  weighted <- setdiff(method, "fqe")
+  if (length(weighted)) check_cut(steps, horizon, weighted, call)
+  policy <- offline_policy(policy, steps, folds, call)
+  seed <- seed %||% draw_seed()
+  generator <- new_generator(seed)
+  fold <- with_generator(generator, sample(rep_len(seq_len(folds %||% 5L), steps$episodes)))
+  rules <- rules_of_folds(policy, steps, fold, folds)
+  act <- action_probabilities(rules, steps, fold, call)
+  chosen <- if (length(weighted)) behavior_of(behavior, steps, call)
+  check_interval(interval, method, chosen, call)
+  design <- list(
+    steps = steps, discount = discount, horizon = horizon, stages = stages, fold = fold,
+    # Weights add up to 1, and values are of one rule, in each stratum.
+    stratum = if (is.null(folds)) rep(1L, steps$episodes) else fold, act = act,
+    regression = if (any(c("fqe", "dr", "wdr") %in% method)) {
+      regression_of(steps, formula, model, call)
+    },
+    chosen = chosen, call = call
+  )
+  check_pairs(design)
+  estimated <- estimate_methods(design, method)
+  draws <- if (interval == "bootstrap") {
+    with_generator(generator, replicate_methods(design, method, estimated, replicates))
+  }
+  result <- new_offline(design, method, estimated, draws, level)
+  result[c("policy", "folds", "seed", "interval")] <- list(policy, folds, seed, interval)
+  if (length(weighted)) warn_few_episodes(result)
+  result
+}
+
+# Checks --------------------------------------------------------------------------------
+
+offline_methods <- c("fqe", "is", "wis", "pdis", "dr", "wdr")
+
+check_methods <- function(method, call) {
+  for (one in method) check_choice(one, offline_methods, arg = "method", call = call)
+  intersect(offline_methods, method)
+}
+
+check_many_episodes <- function(steps, folds, call) {
+  check_count(folds, min = 2, allow_null = TRUE, call = call)
+  least <- folds %||% 1L * 2L
+  if (steps$episodes < least) {
+    gym_abort(
+      c(paste0("The data has ", count_of(steps$episodes, "episode"), ", but at least ", least,
+               " are needed to say how sure an estimate is."),
+        i = "`steps_data(episode = )` tells which steps belong together."),
+      class = "gym_error_argument", argument = "data", value = steps$episodes, call = call
+    )
+  }
+}
+
+check_cut <- function(steps, horizon, weighted, call) {
+  shortest <- if (length(steps$cut)) min(steps$cut)
+  if (!is.null(shortest) && (horizon %||% Inf) > shortest) {
+    gym_abort(
+      c(paste0(count_of(length(steps$cut), "episode"), " of the data ",
+               if (length(steps$cut) == 1L) "was" else "were", " cut off, the first after ",
+               count_of(shortest, "step"), ", so ", quoted_names(weighted),
+               " cannot know all rewards."),
+        i = paste0("Give a `horizon` of at most ", shortest, ", or `method = \"fqe\"`.")),
+      class = "gym_error_argument", argument = "horizon", value = horizon, call = call
+    )
+  }
+}
+
+check_interval <- function(interval, method, chosen, call) {
+  unfit <- setdiff(method, c("is", "pdis", "dr"))
+  if (interval == "t" && (length(unfit) || chosen$estimated)) {
+    gym_abort(
+      if (length(unfit)) {
+        paste0("`interval = \"t\"` is for \"is\", \"pdis\" and \"dr\", not for ", "\"",
+               paste(unfit, collapse = "\", \""), "\": use \"bootstrap\".")
+      } else {
+        paste("`interval = \"t\"` needs known probabilities of the actions, not estimated ones:",
+              "use \"bootstrap\".")
+      },
+      class = "gym_error_argument", argument = "interval", value = interval, call = call
+    )
+  }
+}
+
+# The steps of the policy in pairs of a state and an action that a table has no step of.
+check_pairs <- function(design) {
+  regression <- design$regression
+  if (is.null(regression$states)) {
+    return(invisible())
+  }
+  here <- regression$block(design$steps$state)
+  taken <- matrix(FALSE, nrow(regression$states), length(design$steps$actions))
+  taken[cbind(here, design$steps$action)] <- TRUE
+  without <- rowSums(design$act$here * !taken[here, , drop = FALSE])
+  share <- mean(without)
+  if (share > 0) {
+    rlang::warn(
+      c(paste0("In ", percent_text(share), " of the steps the policy takes an action that the ",
+               "data never took in that state."),
+        i = "For these the table has no value and counts 0: give a `formula` or a `model`."),
+      class = "gym_warning_offline", call = design$call
+    )
+  }
+}
+
+warn_few_episodes <- function(result) {
+  largest <- max(result$weights) / max(sum(result$weights), .Machine$double.xmin)
+  if (result$effective < 10 || largest > 0.2) {
+    rlang::warn(
+      c(paste0("The weighted estimates depend on few episodes: ",
+               whole_number_text(result$episodes), " count as ", number_text(result$effective),
+               ", and one has ", percent_text(largest), " of the weight."),
+        i = "The policy differs too much from the data's, or the `horizon` is too long."),
+      class = "gym_warning_offline"
+    )
+  }
+}
+
+# Estimates -----------------------------------------------------------------------------
+
+#' Estimate the value by each method
+#'
+#' @param design What all methods use.
+#' @return A list: `parts`, see [weighted_parts()]; `estimates`, a named vector; `se`, standard
+#'   errors of those that are means over episodes.
+#' @noRd
+estimate_methods <- function(design, method) {
+  once <- matrix(1, design$steps$episodes, 1L)
+  weighted <- setdiff(method, "fqe")
+  parts <- if (length(weighted)) {
+    q <- if (any(c("dr", "wdr") %in% weighted)) cross_fitted(design)
+    weighted_parts(design, q, design$chosen$of(once[, 1L]))
+  }
+  estimates <- if (length(weighted)) weighted_estimates(parts, design$stratum, once, weighted)[1L, ]
+  if (length(weighted) == 1L) names(estimates) <- weighted
+  if ("fqe" %in% method) {
+    fitting <- prepare_fqe(design)
+    estimates <- c(fqe = fitted_value(design, fitting, once[, 1L]), estimates)
+  } else {
+    fitting <- NULL
+  }
+  list(parts = parts, fitting = fitting, estimates = estimates[method])
+}
+
+replicate_methods <- function(design, method, estimated, replicates) {
+  n <- design$steps$episodes
+  counts <- matrix(0, n, replicates)
+  for (own in split(seq_len(n), design$stratum)) {
+    counts[own, ] <- stats::rmultinom(replicates, length(own), rep(1, length(own)))
+  }
+  weighted <- setdiff(method, "fqe")
+  draws <- if (length(weighted) && !design$chosen$estimated) {
+    weighted_estimates(estimated$parts, design$stratum, counts, weighted)
+  } else if (length(weighted)) {
+    do.call(rbind, lapply(seq_len(replicates), function(i) {
+      parts <- reweighted(estimated$parts, design, design$chosen$of(counts[, i]))
+      weighted_estimates(parts, design$stratum, counts[, i, drop = FALSE], weighted)
+    }))
+  }
+  if ("fqe" %in% method) {
+    fqe <- apply(counts, 2L, function(count) fitted_value(design, estimated$fitting, count))
+    draws <- cbind(fqe = fqe, draws)
+  }
+  draws[, method, drop = FALSE]
+}
+
+#' Prepare the estimates with weights
+#'
+#' @param q A list of `taken`, the value of the action of each step, and `state`, the value of its
+#'   state; or `NULL`.
+#' @param chosen The probability of each step's action in the data.
+#' @return A list of matrices with a row for each episode and a column for each step: `weight`, the
+#'   product of ratios of probabilities until then (it stays after the end), `before`, that of the
+#'   step before, and discounted `reward`, `residual` (of the regression) and `value`.
+#' @noRd
+weighted_parts <- function(design, q, chosen) {
+  steps <- design$steps
+  longest <- min(design$horizon %||% steps$longest, steps$longest)
+  check_fits_memory(
+    as.double(steps$episodes) * longest, "A weight of each step", design$call, "data",
+    "Give a shorter `horizon`."
+  )
+  within <- steps$step <= longest
+  at <- cbind(steps$episode, steps$step)[within, , drop = FALSE]
+  shrink <- design$discount^(steps$step - 1)
+  spread <- function(x, empty = 0) {
+    matrix <- matrix(empty, steps$episodes, longest)
+    matrix[at] <- x[within]
+    matrix
+  }
+  parts <- list(
+    at = at, within = within, reward = spread(shrink * steps$reward),
+    residual = if (!is.null(q)) spread(shrink * (steps$reward - q$taken)),
+    value = if (!is.null(q)) spread(shrink * q$state)
+  )
+  reweighted(parts, design, chosen)
+}
+
+reweighted <- function(parts, design, chosen) {
+  own <- design$act$here[cbind(seq_along(chosen), design$steps$action)]
+  weight <- matrix(1, nrow(parts$reward), ncol(parts$reward))
+  weight[parts$at] <- (own / chosen)[parts$within]
+  for (step in seq_len(ncol(weight))[-1L]) weight[, step] <- weight[, step] * weight[, step - 1L]
+  parts$weight <- weight
+  parts$before <- cbind(1, weight[, -ncol(weight), drop = FALSE])
+  parts$last <- weight[, ncol(weight)]
+  parts
+}
+
+#' Compute the estimates with weights
+#' @param counts A matrix with a column for each replicate: how often each episode was drawn.
+#' @return A matrix with a row for each replicate and a column for each method.
+#' @noRd
+weighted_estimates <- function(parts, stratum, counts, methods) {
+  means <- episode_scores(parts, intersect(methods, c("is", "pdis", "dr")))
+  n <- nrow(counts)
+  found <- if (length(means)) crossprod(counts, means) / n
+  share <- tabulate(stratum) / n
+  # The mean over strata of what is normalised in each.
+  in_strata <- function(of) {
+    Reduce(`+`, lapply(seq_along(share), function(own) share[[own]] * of(stratum == own)))
+  }
+  ratio <- function(own, x, weight) {
+    over <- crossprod(counts[own, , drop = FALSE], x[own, , drop = FALSE])
+    under <- crossprod(counts[own, , drop = FALSE], weight[own, , drop = FALSE])
+    # Where no episode follows the policy any more nothing is known; only the regression counts.
+    ifelse(under > 0, over / under, 0)
+  }
+  if ("wis" %in% methods) {
+    last <- cbind(parts$last)
+    wis <- in_strata(function(own) ratio(own, last * rowSums(parts$reward), last))
+    found <- cbind(found, wis = drop(wis))
+  }
+  if ("wdr" %in% methods) {
+    wdr <- in_strata(function(own) {
+      rowSums(ratio(own, parts$weight * parts$residual, parts$weight)) +
+        rowSums(ratio(own, parts$before * parts$value, parts$before))
+    })
+    found <- cbind(found, wdr = wdr)
+  }
+  found[, methods, drop = FALSE]
+}
+
+# A matrix with a row for each episode and a column for each method that is a mean over episodes.
+episode_scores <- function(parts, methods) {
+  scores <- lapply(rlang::set_names(methods), function(method) {
+    switch(
+      method, is = parts$last * rowSums(parts$reward), pdis = rowSums(parts$weight * parts$reward),
+      dr = rowSums(parts$weight * parts$residual + parts$before * parts$value)
+    )
+  })
+  do.call(cbind, scores)
+}
+
+# Results -------------------------------------------------------------------------------
+
+new_offline <- function(design, method, estimated, draws, level) {
+  steps <- design$steps
+  tail <- (1 - level) / 2
+  rows <- lapply(rlang::set_names(method), function(one) {
+    estimate <- estimated$estimates[[one]]
+    if (is.null(draws)) {
+      mean_interval(episode_scores(estimated$parts, one)[, 1L], level)
+    } else {
+      ends <- stats::quantile(draws[, one], c(tail, 1 - tail), names = FALSE)
+      c(estimate, stats::sd(draws[, one]), ends)
+    }
+  })
+  estimates <- data.frame(method = method, do.call(rbind, rows), row.names = NULL)
+  names(estimates)[-1L] <- c("estimate", "se", "lower", "upper")
+  weights <- estimated$parts$last
+  structure(
+    list(
+      estimates = estimates, observed = observed_value(design, level), weights = weights,
+      effective = if (length(weights)) effective_number(weights), replicates = draws,
+      episodes = steps$episodes, steps = length(steps$reward), discount = design$discount,
+      horizon = design$horizon, level = level, model = design$regression$label,
+      behavior = design$chosen$label
+    ),
+    class = "gym_offline"
+  )
+}
+
+effective_number <- function(weights) {
+  if (any(weights > 0)) sum(weights)^2 / sum(weights^2) else 0
+}
+
+# The mean, its standard error and its interval.
+mean_interval <- function(x, level) {
+  n <- length(x)
+  se <- stats::sd(x) / sqrt(n)
+  c(mean(x), se, mean(x) + c(-1, 1) * stats::qt((1 + level) / 2, n - 1) * se)
+}
+
+observed_value <- function(design, level) {
+  steps <- design$steps
+  horizon <- design$horizon %||% Inf
+  known <- !length(steps$cut) || min(steps$cut) >= horizon
+  shrunk <- design$discount^(steps$step - 1) * steps$reward * (steps$step <= horizon)
+  row <- mean_interval(rowsum(shrunk, steps$episode)[, 1L], level)
+  if (!known) row[] <- NA
+  stats::setNames(data.frame(t(row)), c("estimate", "se", "lower", "upper"))
+}
+
+#' @export
+as.data.frame.gym_offline <- function(x, row.names = NULL, optional = FALSE, ...) x$estimates
+
+#' @export
+print.gym_offline <- function(x, ...) {
+  cat(
+    offline_title(x),
+    paste0("From ", count_of(x$episodes, "episode"), ", ", count_of(x$steps, "step"),
+           if (x$discount < 1) paste0(", discount ", number_text(x$discount)),
+           if (!is.null(x$horizon)) paste0(", horizon ", x$horizon), "; intervals of ",
+           percent_text(x$level), if (x$interval == "t") " by t" else " by bootstrap"),
+    sep = "\n"
+  )
+  shown <- rbind(x$estimates, data.frame(method = "observed", x$observed))
+  shown[-1L] <- lapply(shown[-1L], signif, 4L)
+  print(shown, row.names = FALSE)
+  if (!is.null(x$weights)) {
+    shares <- sort(x$weights / sum(x$weights), decreasing = TRUE)
+    cat(paste0("Effective episodes: ", number_text(x$effective), "; largest weights: ",
+               toString(percent_text_each(utils::head(shares, 3L)))),
+        paste0("Probabilities of the actions: ", x$behavior), sep = "\n")
+  }
+  if (!is.null(x$model)) cat("Values: ", x$model, "\n", sep = "")
+  invisible(x)
+}
+
+offline_title <- function(x) {
+  if (is.null(x$folds)) {
+    "Value of the policy, by data of another one"
+  } else {
+    paste0("Mean value of ", x$folds, " rules, each learned without the episodes it is valued on")
+  }
+}

@@ -1,0 +1,387 @@
+#' Learn a rule from data
+#'
+#' Fitted Q-iteration: regress the reward, plus the discounted value of the best action in the next
+#' state, on the state and the action, again and again, until the values do not change any more
+#' (Ernst, Geurts and Wehenkel 2005). With a horizon it goes backwards from the last step, which is
+#' Q-learning for dynamic treatment regimes (Murphy 2005). [learn_q()] does the same with a table.
+#'
+#' # Models
+#'
+#' Without `formula` and `model`, values are means in a table if all columns of the state are text,
+#' factors, logical values or integers, and there are at least five steps for each pair of a state
+#' and an action. Otherwise it is [lm()] with coefficients of its own for each action. `formula`
+#' replaces its terms, as in `~ action * (age + severity)`.
+#'
+#' Any other model is given as a function of a formula and data that returns an object which
+#' [predict()] knows, such as `rpart::rpart`, `mgcv::gam` or
+#' `function(formula, data) nnet::nnet(formula, data, size = 5, linout = TRUE)`. In the data the
+#' action is a factor.
+#'
+#' # Stages
+#'
+#' With a horizon there are values for each step. By default they are computed from all steps, which
+#' is right if the next state and the reward depend on the state and the action alone. With
+#' `stages = TRUE` each step has a model of its own, fitted to this step of all episodes: for data
+#' in which the first treatment works differently from the second. Without it, the number of the
+#' stage can be a part of the state.
+#'
+#' @param data Steps: the result of [steps_data()], a data frame with its columns, or a [rollout()]
+#'   with `steps = TRUE`.
+#' @param formula A formula with `action` and columns of the state on its right side. `NULL`, the
+#'   default, is described below.
+#' @param model A function of a formula and data that fits a model. `NULL`, the default, is
+#'   described below.
+#' @param discount The discount, a number above 0 and at most 1, the default.
+#' @param iterations The largest number of regressions, a whole number. The default is 100. It stops
+#'   earlier if no value changes by more than 1e-12 of its size.
+#' @param horizon The number of steps after which everything ends, a whole number. `NULL`, the
+#'   default, for the end of the episode.
+#' @param stages Does each step have its own model? `FALSE`, the default, or `TRUE`, which requires
+#'   a `horizon`.
+#' @param double Use double Q-learning? `FALSE`, the default, or `TRUE`: each half of the episodes
+#'   chooses the best actions for the other half, whose values are then not too large by chance (van
+#'   Hasselt 2010).
+#' @return A policy of class `gym_policy_fitted`. [predict()][predict.gym_policy()] takes a data
+#'   frame of states and returns their actions, with `type = "output"` the values of all actions.
+#'   [rollout()] plays it, unless it has a horizon; then `predict()` needs the column `step`, too.
+#'   [state_values()] returns the values of the states of the data. It takes the most frequent
+#'   action where the data does not tell.
+#' @section Errors: `gym_error_argument` for invalid steps, a formula with unknown columns, or a
+#'   model that cannot be fitted.
+#' @references D. Ernst, P. Geurts, L. Wehenkel (2005), Tree-based batch mode reinforcement
+#'   learning, JMLR 6. S. Murphy (2005), A generalization error for Q-learning, JMLR 6. H. van
+#'   Hasselt (2010), Double Q-learning, NeurIPS 23.
+#' @seealso [evaluate_offline()]: how good is it?
+#' @export
+#' @examples
+#' set.seed(1)
+#' visits <- data.frame(patient = rep(1:200, each = 2), severity = runif(400),
+#'                      drug = sample(c("old", "new"), 400, replace = TRUE))
+#' visits$wellbeing <- with(visits, ifelse(drug == "new", severity, 1 - severity)) + rnorm(400)
+#' steps <- steps_data(visits, "patient", "severity", "drug", "wellbeing")
+#' rule <- learn_fitted_q(steps, horizon = 2)
+#' rule
+#' predict(rule, data.frame(severity = c(0.1, 0.9), step = 1))
+learn_fitted_q <- function(data, formula = NULL, model = NULL, discount = 1, iterations = 100,
+                           horizon = NULL, stages = FALSE, double = FALSE) {
+  call <- rlang::current_env()
+  steps <- steps_of(data, call)
+  check_discount(discount)
+  check_count(iterations)
+  check_horizon(horizon, stages, steps, call)
+  check_flag(double)
+  recipe <- list(
+    formula = formula, model = model, discount = discount, iterations = iterations,
+    horizon = horizon, stages = stages, double = double, table = FALSE
+  )
+  fit_rule(steps, recipe, call)
+}
+
+# Batch Q-learning on a table, for learn_q(): sweeps over all pairs that the data has.
+learn_table <- function(data, discount, double, iterations, call) {
+  steps <- steps_of(data, call)
+  recipe <- list(
+    discount = discount, iterations = iterations %||% 10000, stages = FALSE, double = double,
+    table = TRUE
+  )
+  fit_rule(steps, recipe, call)
+}
+
+check_horizon <- function(horizon, stages, steps, call) {
+  check_count(horizon, allow_null = TRUE, call = call)
+  check_flag(stages, call = call)
+  if (stages && is.null(horizon)) {
+    abort_argument(horizon, "the number of stages", "horizon", call)
+  }
+  if (isTRUE(horizon > steps$longest)) {
+    gym_abort(
+      paste0("`horizon` is ", whole_number_text(horizon), ", but the longest episode of the data ",
+             "has ", count_of(steps$longest, "step"), ": at most these can be used."),
+      class = "gym_error_argument", argument = "horizon", value = horizon, call = call
+    )
+  }
+}
+
+fit_rule <- function(steps, recipe, call) {
+  regression <- if (recipe$table) {
+    table_regression(steps)
+  } else {
+    regression_of(steps, recipe$formula, recipe$model, call)
+  }
+  update <- if (recipe$double) double_update else best_update
+  prepared <- prepare_steps(steps, regression, recipe$stages)
+  if (recipe$table) prepared <- equal_steps_together(prepared)
+  fits <- iterate_fits(
+    function(fit, step) update(prepared, regression, fit, step, recipe$discount),
+    recipe$horizon, recipe$iterations,
+    function(fit) best_next_values(regression, fit, prepared$after)
+  )
+  new_rule(regression, fits, steps, recipe)
+}
+
+# `recipe` has the arguments by which it is learned again in folds, if it can be.
+new_rule <- function(regression, fits, steps, recipe) {
+  structure(
+    list(
+      regression = regression, fits = fits, recipe = recipe, actions = steps$actions,
+      most_taken = which.max(tabulate(steps$action)), keys = episode_keys(steps),
+      states = names(steps$state), seen = steps$state, taken = steps$action,
+      step = steps$step, observation_space = NULL, action_space = NULL
+    ),
+    class = c("gym_policy_fitted", "gym_policy")
+  )
+}
+
+# Fitting -------------------------------------------------------------------------------
+
+prepare_steps <- function(steps, regression, stages) {
+  steps$here <- regression$block(steps$state)
+  steps$after <- regression$block(steps$after)
+  steps$stages <- stages
+  steps
+}
+
+# Steps of a table that start and end in the same way, with their mean reward and their number.
+equal_steps_together <- function(prepared) {
+  each <- c("episode", "here", "action", "after", "ends", "known")
+  prepared$episode <- prepared$episode %% 2L
+  key <- do.call(paste, prepared[each])
+  group <- match(key, unique(key))
+  prepared$reward <- rowsum(prepared$reward, group)[, 1L] / tabulate(group)
+  prepared$weight <- tabulate(group)
+  first <- !duplicated(group)
+  prepared[each] <- lapply(prepared[each], function(x) x[first])
+  prepared
+}
+
+#' Fit values until they do not change any more, or backwards
+#' @param update A function of the fit of the next step (`NULL` at first) and the number of a step
+#'   (`NA` without a horizon) that returns another fit.
+#' @param values_of A function of a fit that returns the values by which a change is noticed.
+#' @return A list of fits: one for each step of a horizon, or a single one.
+#' @noRd
+iterate_fits <- function(update, horizon, iterations, values_of) {
+  fit <- NULL
+  if (!is.null(horizon)) {
+    fits <- vector("list", horizon)
+    for (step in rev(seq_len(horizon))) fits[[step]] <- fit <- update(fit, step)
+    return(fits)
+  }
+  before <- Inf
+  for (iteration in seq_len(iterations)) {
+    fit <- update(fit, NA)
+    values <- values_of(fit)
+    if (all(abs(values - before) <= 1e-12 * pmax(1, abs(values)))) break
+    before <- values
+  }
+  list(fit)
+}
+
+#' Fit the reward plus the value of the next state
+#' @param ahead The value of each step's next state; `NULL` if nothing comes after this step.
+#' @param weight The weight of each step.
+#' @noRd
+fit_targets <- function(prepared, regression, ahead, step, discount, weight = 1) {
+  target <- prepared$reward
+  weight <- rep_len(weight * (prepared$weight %||% 1), length(target))
+  if (!is.null(ahead)) {
+    target <- target + ifelse(prepared$ends | !prepared$known, 0, discount * ahead)
+    # What came after the end of the records is not known.
+    weight[!prepared$ends & !prepared$known] <- 0
+  }
+  if (prepared$stages) weight[prepared$step != step] <- 0
+  regression$fit(prepared$here, prepared$action, target, weight)
+}
+
+best_update <- function(prepared, regression, fit, step, discount) {
+  ahead <- if (!is.null(fit)) best_next_values(regression, fit, prepared$after)
+  fit_targets(prepared, regression, ahead, step, discount)
+}
+
+# A fit is then a list of two, one of each half of the episodes.
+double_update <- function(prepared, regression, fit, step, discount) {
+  half <- prepared$episode %% 2L
+  lapply(0:1, function(own) {
+    ahead <- if (!is.null(fit)) {
+      chooses <- known_values(regression$values(fit[[own + 1L]], prepared$after))
+      valued <- regression$values(fit[[2L - own]], prepared$after)
+      valued <- valued[cbind(seq_len(nrow(valued)), max.col(chooses, "first"))]
+      ifelse(is.na(valued), 0, valued)
+    }
+    fit_targets(prepared, regression, ahead, step, discount, half == own)
+  })
+}
+
+known_values <- function(q) {
+  q[is.na(q)] <- -Inf
+  q
+}
+
+# The value of the best action that was taken in each state; 0 where none was.
+best_next_values <- function(regression, fit, block) {
+  best_values(known_values(fit_values(regression, fit, block)))
+}
+
+fit_values <- function(regression, fit, block) {
+  # Of double Q-learning.
+  if (is.list(fit) && length(fit) == 2L && is.null(attributes(fit))) {
+    return((regression$values(fit[[1L]], block) + regression$values(fit[[2L]], block)) / 2)
+  }
+  regression$values(fit, block)
+}
+
+# Using it ------------------------------------------------------------------------------
+
+# The values of all actions in some states, a data frame.
+rule_values <- function(policy, states, step = NULL, call = rlang::caller_env()) {
+  check_columns(states, policy$states, "newdata", call)
+  states <- as.data.frame(states)[policy$states]
+  for (name in names(states)) {
+    levels <- levels(policy$seen[[name]])
+    if (!is.null(levels)) {
+      new <- setdiff(as.character(states[[name]]), levels)
+      if (length(new)) {
+        gym_abort(
+          c(paste0("The rule knows no ", name, " ", describe_value(new[[1L]]), "."),
+            i = paste0("The data has ", few_names(levels), ".")),
+          class = "gym_error_argument", argument = "newdata", value = states, call = call
+        )
+      }
+      states[[name]] <- factor(states[[name]], levels)
+    }
+  }
+  block <- policy$regression$block(states)
+  if (length(policy$fits) == 1L) {
+    return(fit_values(policy$regression, policy$fits[[1L]], block))
+  }
+  values <- matrix(NA_real_, nrow(states), length(policy$actions))
+  step <- rep_len(step, nrow(states))
+  if (!all(step %in% seq_along(policy$fits))) {
+    must <- paste("a step from 1 to", length(policy$fits))
+    abort_argument(setdiff(step, seq_along(policy$fits))[1L], must, "newdata$step", call)
+  }
+  for (own in unique(step)) {
+    some <- fit_values(policy$regression, policy$fits[[own]], block)
+    values[step == own, ] <- some[step == own, ]
+  }
+  values
+}
+
+best_known <- function(policy, values) {
+  values <- known_values(values)
+  ifelse(rowSums(values > -Inf) > 0, max.col(values, "first"), policy$most_taken)
+}
+
+#' @exportS3Method
+predict_policy.gym_policy_fitted <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (!is.data.frame(newdata)) {
+    newdata <- data.frame(matrix(newdata, ncol = length(policy$states)))
+    names(newdata) <- policy$states
+  }
+  if (length(policy$fits) > 1L) check_columns(newdata, "step", "newdata", call)
+  values <- rule_values(policy, newdata, newdata[["step"]], call)
+  colnames(values) <- as.character(policy$actions)
+  best <- best_known(policy, values)
+  switch(
+    type, action = policy$actions[best], output = values,
+    probability = {
+      values[] <- 0
+      values[cbind(seq_along(best), best)] <- 1
+      values
+    }
+  )
+}
+
+#' @export
+act.gym_policy_fitted <- function(policy, observation, ...) {
+  predict_policy(policy, observation, "action")
+}
+
+#' @exportS3Method
+act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
+  if (length(policy$fits) > 1L) {
+    gym_abort(
+      c("A rule with a horizon depends on the step, so it cannot be played.",
+        i = "`predict()` asks it, with a column `step`; without a horizon a rule plays."),
+      class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
+    )
+  }
+  columns <- data.frame(
+    observation_columns(vector_env$observation_space, observation), check.names = FALSE
+  )
+  if (!all(policy$states %in% names(columns)) && length(columns) == length(policy$states)) {
+    names(columns) <- policy$states
+  }
+  actions <- predict_policy(policy, columns, "action", vector_env$call)
+  encoded_values(vector_env$action_space, actions, "the action", vector_env$call)
+}
+
+#' @export
+format.gym_policy_fitted <- function(x, ...) {
+  recipe <- x$recipe
+  if (is.null(recipe)) {
+    return(x$regression$label)
+  }
+  paste0(
+    "fitted Q", if (recipe$double) ", double", ", ", x$regression$label,
+    if (recipe$discount < 1) paste0(", discount ", number_text(recipe$discount)),
+    if (!is.null(recipe$horizon)) paste0(", horizon ", recipe$horizon)
+  )
+}
+
+#' @export
+print.gym_policy_fitted <- function(x, ...) {
+  cat("<policy: ", format(x), ">\n", sep = "")
+  shown <- length(x$fits) == 1L | x$step <= length(x$fits)
+  taken <- best_known(x, rule_values(x, x$seen[shown, , drop = FALSE], x$step[shown]))
+  share <- function(action) tabulate(action, length(x$actions)) / length(action)
+  print(data.frame(
+    action = as.character(x$actions), rule = percent_text_each(share(taken)),
+    data = percent_text_each(share(x$taken[shown]))
+  ), row.names = FALSE)
+  cat(rule_lines(x), sep = "\n")
+  invisible(x)
+}
+
+# With two actions a linear rule is one inequality; a small table is shown as it is.
+rule_lines <- function(x) {
+  regression <- x$regression
+  if (!is.null(regression$coefficients) && length(x$actions) == 2L && !x$recipe$double) {
+    return(unlist(lapply(seq_along(x$fits), function(step) {
+      own <- regression$coefficients(x$fits[[step]])
+      action <- paste0("action", x$actions[[2L]])
+      own <- own[grepl(action, names(own), fixed = TRUE)]
+      terms <- gsub(paste0(":?", action, ":?"), "", names(own))
+      terms <- ifelse(nzchar(terms), paste0(" x ", gsub("`", "", terms)), "")
+      paste0(
+        if (length(x$fits) > 1L) paste0("Step ", step, ": "), "Takes ", x$actions[[2L]], " if ",
+        paste0(number_text_each(own), terms, collapse = " + "), " > 0"
+      )
+    })))
+  }
+  if (!is.null(regression$states) && nrow(regression$states) <= 12L && length(x$fits) == 1L) {
+    best <- best_known(x, rule_values(x, regression$states))
+    states <- do.call(paste, c(unname(lapply(regression$states, as.character)), sep = ", "))
+    return(paste0(states, ": ", x$actions[best]))
+  }
+  character()
+}
+
+# The values of the states of the data, for state_values().
+rule_state_values <- function(policy, actions) {
+  states <- policy$seen
+  if (length(policy$fits) > 1L) {
+    states <- data.frame(step = policy$step, states, check.names = FALSE)
+    states <- states[policy$step <= length(policy$fits), , drop = FALSE]
+  }
+  states <- sorted_rows(unique(states))
+  q <- rule_values(policy, states, states[["step"]])
+  if (!actions) {
+    return(data.frame(states, value = best_values(known_values(q)), check.names = FALSE))
+  }
+  row <- rep(seq_len(nrow(q)), each = ncol(q))
+  data.frame(
+    states[row, , drop = FALSE], action = rep(policy$actions, nrow(q)), value = as.vector(t(q)),
+    row.names = NULL, check.names = FALSE
+  )
+}

@@ -1,0 +1,131 @@
+# Fitted Q evaluation: values of a policy by a regression, and its cross-fitted values for doubly
+# robust estimates.
+
+#' Fit the values of the policy
+#'
+#' @param prepared As [prepare_steps()] returns it.
+#' @param weight The weight of each step.
+#' @param next_at A function of a step that returns the policy's probabilities in the next states.
+#' @param start A fit to start from, or `NULL`.
+#' @return A list of fits, one for each step of a horizon, or a single one.
+#' @noRd
+policy_fits <- function(design, prepared, weight, next_at, start = NULL) {
+  regression <- design$regression
+  discount <- design$discount
+  if (is.null(design$horizon) && !is.null(regression$fixed)) {
+    usable <- prepared$ends | prepared$known
+    go_on <- ifelse(prepared$ends | !usable, 0, discount)
+    return(list(regression$fixed(
+      prepared$here, prepared$after, prepared$action, prepared$reward, go_on, next_at(NA),
+      weight * usable, design$call
+    )))
+  }
+  # Steps are the last one, the one before, and so on. No policy here counts them unless `stages`
+  # or the policy does.
+  ahead_of <- function(fit, step) {
+    if (!is.null(fit)) {
+      policy_mean(regression$values(fit, prepared$after), next_at(step + 1))
+    }
+  }
+  iterate_fits(
+    function(fit, step) {
+      # Without a horizon the fit to start from, if there is one, saves iterations.
+      fit <- if (is.na(step)) fit %||% start else fit
+      fit_targets(prepared, regression, ahead_of(fit, step), step, discount, weight)
+    },
+    design$horizon, most_evaluations, function(fit) ahead_of(fit, NA)
+  )
+}
+
+most_evaluations <- 200L
+
+# The mean over the actions; what a table has no value for counts 0.
+policy_mean <- function(q, p) {
+  q[is.na(q)] <- 0
+  rowSums(q * p)
+}
+
+# The values of actions for each step of a block, by the fit of its step.
+values_by_step <- function(regression, fits, block, step, actions) {
+  if (length(fits) == 1L) {
+    q <- regression$values(fits[[1L]], block)
+  } else {
+    q <- matrix(0, length(step), actions)
+    for (own in intersect(seq_along(fits), step)) {
+      q[step == own, ] <- regression$values(fits[[own]], block)[step == own, ]
+    }
+  }
+  q[is.na(q)] <- 0
+  q
+}
+
+# Fitted Q evaluation --------------------------------------------------------------------
+
+# The prepared steps of each stratum, whose rule they value.
+prepare_fqe <- function(design) {
+  lapply(sort(unique(design$stratum)), function(own) {
+    rows <- which(design$stratum[design$steps$episode] == own)
+    prepared <- prepare_steps(steps_in(design$steps, rows), design$regression, design$stages)
+    first <- which(prepared$step == 1L)
+    next_at <- once_per_key(function(step) design$act$after(own, step)[rows, , drop = FALSE])
+    fitting <- list(
+      prepared = prepared, next_at = next_at, first = first,
+      first_block = design$regression$block(prepared$state[first, , drop = FALSE]),
+      first_p = design$act$here[rows[first], , drop = FALSE],
+      share = mean(design$stratum == own)
+    )
+    fitting$fit <- policy_fits(design, prepared, rep(1, length(rows)), next_at)
+    fitting
+  })
+}
+
+# What is needed in each replicate is computed once.
+once_per_key <- function(f) {
+  kept <- list()
+  function(x) {
+    key <- toString(x)
+    if (is.null(kept[[key]])) kept[[key]] <<- f(x)
+    kept[[key]]
+  }
+}
+
+# The value of the policy if each episode counts this often.
+fitted_value <- function(design, fitting, count) {
+  sum(vapply(fitting, function(own) {
+    prepared <- own$prepared
+    # What only episodes know that were not drawn keeps its place, with almost no weight.
+    weight <- pmax(count, tiny_weight)[prepared$episode]
+    fits <- if (all(count == 1)) {
+      own$fit
+    } else {
+      policy_fits(design, prepared, weight, own$next_at, own$fit[[1L]])
+    }
+    values <- policy_mean(design$regression$values(fits[[1L]], own$first_block), own$first_p)
+    own$share * stats::weighted.mean(values, count[prepared$episode[own$first]])
+  }, 0))
+}
+
+tiny_weight <- 1e-6
+
+# For doubly robust estimates -------------------------------------------------------------
+
+#' Compute the values of each step by a regression on the other folds' episodes
+#' @return A list of `taken`, the value of the action of each step, and `state`, that of its state.
+#' @noRd
+cross_fitted <- function(design) {
+  steps <- design$steps
+  taken <- state <- numeric(length(steps$step))
+  of_step <- design$fold[steps$episode]
+  for (own in sort(unique(design$fold))) {
+    others <- which(of_step != own)
+    rows <- which(of_step == own)
+    prepared <- prepare_steps(steps_in(steps, others), design$regression, design$stages)
+    next_at <- function(step) design$act$after(own, step)[others, , drop = FALSE]
+    fits <- policy_fits(design, prepared, rep(1, length(others)), next_at)
+    block <- design$regression$block(steps$state[rows, , drop = FALSE])
+    q <- values_by_step(design$regression, fits, block, steps$step[rows], length(steps$actions))
+    taken[rows] <- q[cbind(seq_along(rows), steps$action[rows])]
+    state[rows] <- policy_mean(q, design$act$here[rows, , drop = FALSE])
+  }
+  list(taken = taken, state = state)
+}

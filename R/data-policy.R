@@ -1,0 +1,231 @@
+# The probability of each action in logged steps: under the policy to evaluate, and in the data.
+
+#' Check the policy to evaluate
+#' @return The policy. A rule that was learned from the same data is an error without folds.
+#' @noRd
+offline_policy <- function(policy, steps, folds, call) {
+  policy <- trained_policy(policy)
+  if (inherits(policy, "gym_policy_fitted")) {
+    shared <- mean(episode_keys(steps) %in% policy$keys)
+    # A few short episodes of other data may be the same by chance.
+    if (is.null(folds) && shared > 0.2) {
+      gym_abort(
+        c(paste0("The policy was learned from the same data (", percent_text(shared), " of the ",
+                 "episodes), so its value there is too large."),
+          i = paste("`folds = 5` learns it again without each fold; or evaluate it on episodes",
+                    "that it has not seen.")),
+        class = "gym_error_argument", argument = "policy", value = policy, call = call
+      )
+    }
+  }
+  if (!is.null(folds) && is.null(policy$recipe)) {
+    abort_argument(policy, "a rule of `learn_fitted_q()` or `learn_q()` if there are `folds`",
+                   "policy", call)
+  }
+  policy
+}
+
+# The policy of each fold: learned again without its episodes, or the same for all.
+rules_of_folds <- function(policy, steps, fold, folds) {
+  if (is.null(folds)) {
+    return(list(policy))
+  }
+  lapply(seq_len(folds), function(own) {
+    fit_rule(steps_in(steps, fold[steps$episode] != own), policy$recipe, NULL)
+  })
+}
+
+#' Compute the probabilities with which policies act
+#'
+#' @return A list: `here`, a matrix with a row for each step and a column for each action, by the
+#'   rule of the step's fold, and `after`, a function of the number of a rule and a step (`NA`
+#'   without a horizon) that returns the same by this rule for all next states.
+#' @noRd
+action_probabilities <- function(rules, steps, fold, call) {
+  many <- length(rules)
+  # Only a rule with a horizon depends on the step, and counts no further than it.
+  horizon <- if (inherits(rules[[1L]], "gym_policy_fitted")) length(rules[[1L]]$fits) else 0L
+  counts <- horizon > 1L
+  ask <- function(own, states, step) {
+    if (counts) step <- pmin(step, horizon)
+    probabilities_of(rules[[own]], states, step, steps$actions, call)
+  }
+  here <- matrix(0, length(steps$step), length(steps$actions))
+  of_step <- if (many > 1L) fold[steps$episode] else rep(1L, length(steps$step))
+  for (own in unique(of_step)) {
+    some <- of_step == own
+    here[some, ] <- ask(own, steps$state[some, , drop = FALSE], steps$step[some])
+  }
+  next_states <- steps$after[steps$known, , drop = FALSE]
+  after <- once_per_key(function(key) {
+    found <- matrix(0, length(steps$step), length(steps$actions))
+    found[steps$known, ] <- ask(key[[1L]], next_states, rep(key[[2L]], nrow(next_states)))
+    found
+  })
+  list(here = here, after = function(own, step) {
+    after(c(min(own, many), if (counts) step else 1))
+  })
+}
+
+# A row for each state, a column for each action of the data.
+probabilities_of <- function(policy, states, step, actions, call) {
+  many <- length(actions)
+  said <- if (inherits(policy, "gym_policy_fitted")) {
+    predict_policy(policy, data.frame(states, step = step, check.names = FALSE), "probability",
+                   call)[, match(as.character(actions), as.character(policy$actions)), drop = FALSE]
+  } else if (inherits(policy, "gym_policy_random")) {
+    matrix(1 / many, nrow(states), many)
+  } else if (inherits(policy, "gym_policy")) {
+    known_policy_says(policy, states, actions, call)
+  } else if (is.function(policy)) {
+    policy(states)
+  } else {
+    policy
+  }
+  if (is.data.frame(said)) said <- as.matrix(said)
+  if (is.matrix(said)) {
+    checked_probabilities(said, nrow(states), actions, call)
+  } else {
+    one_of_actions(said, nrow(states), actions, call)
+  }
+}
+
+# A table and a network have probabilities; another policy says what it does.
+known_policy_says <- function(policy, states, actions, call) {
+  observed <- if (length(states) == 1L) states[[1L]] else states
+  if (inherits(policy$observation_space, "gym_space_discrete")) {
+    observed <- encoded_values(policy$observation_space, observed, "state", call)
+  }
+  said <- tryCatch(
+    predict_policy(policy, observed, "probability", call), gym_error_argument = function(cnd) {
+      predict_policy(policy, observed, "action", call)
+    }
+  )
+  space <- policy$action_space %||% space_discrete(max(NCOL(said), 1L))
+  if (is.matrix(said)) colnames(said) <- value_labels(space) else said <- named_numbers(space, said)
+  said
+}
+
+checked_probabilities <- function(said, n, actions, call) {
+  labels <- as.character(actions)
+  if (is.null(colnames(said)) && ncol(said) == length(labels)) colnames(said) <- labels
+  good <- is.numeric(said) && nrow(said) == n && !is.null(colnames(said)) &&
+    all(are_probabilities(said)) && all(abs(rowSums(said) - 1) < sum_tolerance)
+  if (!good) {
+    must <- paste0("return an action for each state, or a matrix of probabilities with ",
+                   count_of(length(labels), "column"), " that add up to 1 in each row")
+    gym_abort(paste0("`policy` must ", must, ", not ", describe_argument(said), "."),
+              class = "gym_error_argument", argument = "policy", value = said, call = call)
+  }
+  check_seen_actions(colSums(said) / n, labels, call)
+  place <- match(labels, colnames(said))
+  found <- unname(said[, place, drop = FALSE])
+  found[is.na(found)] <- 0
+  found
+}
+
+one_of_actions <- function(said, n, actions, call) {
+  said <- if (is.list(said)) NA else as.character(said)
+  if (!length(said) %in% c(1L, n) || anyNA(said)) {
+    abort_argument(said, paste("an action, or one for each of", count_of(n, "state")), "policy",
+                   call)
+  }
+  said <- rep_len(said, n)
+  check_seen_actions(table(said) / n, as.character(actions), call)
+  found <- matrix(0, n, length(actions))
+  found[cbind(seq_len(n), match(said, as.character(actions)))] <- 1
+  found
+}
+
+# The policy's actions must be in the data: nothing is known of others.
+check_seen_actions <- function(shares, labels, call) {
+  never <- setdiff(names(shares)[shares > 0], labels)
+  if (length(never)) {
+    gym_abort(
+      c(paste0("The policy takes the action \"", never[[1L]], "\" in ",
+               percent_text(sum(shares[never])), " of the steps, which the data never took."),
+        i = did_you_mean(never[[1L]], labels, "\"%s\""),
+        i = paste0("The data has ", few_names(labels), ".")),
+      class = "gym_error_argument", argument = "policy", value = never, call = call
+    )
+  }
+}
+
+# Behavior ------------------------------------------------------------------------------
+
+#' Find out with which probability the actions of the data were chosen
+#'
+#' @return A list: `of`, a function of the weight of each episode that returns the probability of
+#'   each step's action; `estimated`, whether it depends on the weights; `label`.
+#' @noRd
+behavior_of <- function(behavior, steps, call) {
+  at <- cbind(seq_along(steps$action), steps$action)
+  if (is.null(behavior) && !is.null(steps$probability)) {
+    return(known_behavior(steps$probability, "as in the data"))
+  }
+  if (!is.null(behavior) && !inherits(behavior, "formula")) {
+    p <- probabilities_of(behavior, steps$state, steps$step, steps$actions, call)[at]
+    if (any(p == 0)) {
+      gym_abort(
+        paste0("By `behavior` the action in step ", steps$step[p == 0][[1L]], " of episode ",
+               steps$labels[[steps$episode[p == 0][[1L]]]], " has the probability 0, but it was ",
+               "taken: correct `behavior`."),
+        class = "gym_error_argument", argument = "behavior", value = behavior, call = call
+      )
+    }
+    return(known_behavior(p, "given by `behavior`"))
+  }
+  if (is.null(behavior) && is_table_like(steps)) {
+    state <- match(row_keys(steps$state), unique(row_keys(steps$state)))
+    pair <- paste(state, steps$action)
+    pair <- match(pair, unique(pair))
+    shares <- function(weight) {
+      weight <- weight[steps$episode]
+      p <- rowsum(weight, pair)[pair] / rowsum(weight, state)[state]
+      # Episodes that were not drawn count nothing, with any probability.
+      ifelse(weight > 0, p, 1)
+    }
+    return(list(of = shares, estimated = TRUE, label = "shares of actions in each state"))
+  }
+  columns <- paste(sprintf("`%s`", names(steps$state)), collapse = " + ")
+  behavior <- behavior %||% stats::as.formula(paste("~", columns), globalenv())
+  list(
+    of = function(weight) {
+      pmax(logistic_probabilities(behavior, steps, weight[steps$episode], call)[at], 1e-12)
+    },
+    estimated = TRUE, label = paste("logistic regression,", deparse1(behavior))
+  )
+}
+
+known_behavior <- function(p, label) {
+  list(of = function(weight) p, estimated = FALSE, label = label)
+}
+
+logistic_probabilities <- function(formula, steps, weight, call) {
+  many <- length(steps$actions)
+  data <- data.frame(steps$state, taken = steps$action - 1L, weight = weight, check.names = FALSE)
+  formula <- stats::reformulate(deparse1(formula[[length(formula)]]), "taken",
+                                env = environment(formula))
+  if (many == 1L) {
+    return(matrix(1, nrow(data), 1L))
+  }
+  tryCatch({
+    if (many == 2L) {
+      # Weights are counts of episodes.
+      x <- stats::model.matrix(formula, data)
+      fit <- stats::glm.fit(x, data$taken, weights = weight, family = stats::binomial())
+      p <- stats::fitted(fit)
+      return(cbind(1 - p, p))
+    }
+    check_suggested("nnet", "estimate the probabilities of more than two actions", call)
+    data$taken <- factor(data$taken, seq_len(many) - 1L)
+    environment(formula) <- rlang::current_env()
+    stats::fitted(nnet::multinom(formula, data, weights = weight, trace = FALSE))
+  }, gym_error = function(cnd) rlang::cnd_signal(cnd), error = function(cnd) {
+    gym_abort(
+      c("The regression of the actions on the state cannot be fitted.",
+        i = "`behavior = ~ ...` names the columns that the actions depended on."),
+      class = "gym_error_argument", argument = "behavior", call = call, parent = cnd
+    )
+  })
+}

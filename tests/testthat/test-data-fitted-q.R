@@ -1,0 +1,102 @@
+test_that("batch Q-learning solves the model of the steps", {
+  model <- gym_model(data.frame(
+    state = c(0, 0, 0, 0, 1, 1, 1, 1), action = c(0, 0, 1, 1),
+    next_state = c(0, 1, 1, 2, 0, 2, 1, 0), probability = c(0.7, 0.3, 0.6, 0.4, 0.5, 0.5, 0.8, 0.2),
+    reward = c(0, 1, -1, 2, 0, 1, 1, 3)
+  ))
+  played <- rollout(model, policy_random(), episodes = 300, seed = 1, steps = TRUE,
+                    next_observation = TRUE)
+  for (discount in c(0.5, 0.9, 0.99)) {
+    solved <- solve_mdp(estimate_model(played), discount = discount)
+    learned <- learn_q(played, discount = discount)
+    found <- state_values(learned)
+    expect_equal(found$value, unname(solved$values[as.character(found$obs_1)]), tolerance = 1e-8)
+    q <- state_values(learned, actions = TRUE)
+    expect_equal(q$value, as.vector(t(solved$q[as.character(unique(q$obs_1)), ])), tolerance = 1e-8)
+    expect_equal(predict(learned, data.frame(obs_1 = 0:1)), solved$actions[1:2])
+  }
+  expect_error(learn_q(played, epsilon = 0.1), "`learn_q\\(\\)` has no argument `epsilon`")
+})
+
+# Two treatments; the first one prepares for the second. By hand: with x uniform on -1, 1, the best
+# second treatment is 1 if x2 > 0, worth |x2|; x2 = x1 + a1 + noise. See the sums below.
+two_stages <- function(n) {
+  x1 <- sample(c(-1, 1), n, replace = TRUE)
+  a1 <- sample(0:1, n, replace = TRUE)
+  x2 <- x1 * (2 * a1 - 1) + sample(c(-0.5, 0.5), n, replace = TRUE)
+  a2 <- sample(0:1, n, replace = TRUE)
+  data.frame(
+    patient = rep(seq_len(n), 2), stage = rep(1:2, each = n), x = c(x1, x2), action = c(a1, a2),
+    reward = c(0.2 * a1, a2 * x2)
+  )
+}
+
+test_that("backward induction finds the regime that is best by hand", {
+  # The second treatment is worth max(x2, 0). With x1 = 1: treated x2 is 0.5 or 1.5, worth 1 on
+  # average, and 0.2 more; untreated x2 is negative. With x1 = -1 it is the other way round.
+  set.seed(1)
+  steps <- steps_data(two_stages(4000), "patient", "x", time = "stage")
+  rule <- learn_fitted_q(steps, ~ action * x * I(x > 0), horizon = 2, stages = TRUE)
+  q <- predict(rule, data.frame(x = c(-1, 1), step = 1), type = "output")
+  expect_equal(unname(q), rbind(c(1, 0.2), c(0, 1.2)), tolerance = 0.05)
+  expect_equal(predict(rule, data.frame(x = c(-1, 1), step = 1)), 0:1)
+  expect_equal(predict(rule, data.frame(x = c(-0.5, 0.5), step = 2)), 0:1)
+  # Its value, by other data: the mean of 1 and 1.2.
+  set.seed(2)
+  fresh <- steps_data(two_stages(2000), "patient", "x", time = "stage")
+  found <- evaluate_offline(
+    fresh, rule, behavior = policy_random(), formula = ~ action * x * I(x > 0), horizon = 2,
+    stages = TRUE, replicates = 50, seed = 1
+  )$estimates
+  expect_lt(max(abs(found$estimate - 1.1) / found$se), 3.5)
+})
+
+test_that("any regression learns, such as a tree", {
+  skip_if_not_installed("rpart")
+  set.seed(1)
+  steps <- steps_data(two_stages(500), "patient", "x", time = "stage")
+  rule <- learn_fitted_q(steps, model = rpart::rpart, horizon = 2, stages = TRUE)
+  expect_equal(predict(rule, data.frame(x = c(-1, 1), step = 1)), 0:1)
+  expect_error(
+    learn_fitted_q(steps, model = function(formula, data) stop("no")), "cannot be fitted"
+  )
+})
+
+test_that("double Q-learning values less by chance", {
+  # All actions are worth nothing.
+  set.seed(1)
+  steps <- data.frame(episode = 1:200, s = "a", action = rep(1:10, 20), reward = rnorm(200))
+  before <- data.frame(episode = 1:200, s = "start", action = 1L, reward = 0)
+  data <- rbind(before, steps)
+  data$step <- rep(1:2, each = 200)
+  first <- function(double) {
+    values <- state_values(learn_q(steps_data(data), discount = 1, double = double))
+    values$value[values$s == "start"]
+  }
+  expect_gt(first(FALSE), 0.2)
+  expect_lt(abs(first(TRUE)), abs(first(FALSE)))
+})
+
+test_that("a rule plays in the environment of its data", {
+  walk <- gym_model(data.frame(
+    state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
+    reward = c(0, 0, 0, 1)
+  ), start = 1, max_episode_steps = 50)
+  played <- rollout(walk, policy_random(), episodes = 100, seed = 1, steps = TRUE,
+                    next_observation = TRUE)
+  expect_equal(rollout(walk, learn_q(played), episodes = 3, seed = 1)$episodes$return, c(1, 1, 1))
+  linear <- learn_fitted_q(played, discount = 0.9)
+  expect_equal(rollout(walk, linear, episodes = 3, seed = 1)$episodes$return, c(1, 1, 1))
+  by_step <- learn_fitted_q(played, horizon = 2)
+  expect_error(rollout(walk, by_step, episodes = 1), "depends on the step")
+})
+
+test_that("a rule prints what it does", {
+  set.seed(1)
+  data <- data.frame(episode = 1:100, x = runif(100), s = c("high", "low"),
+                     action = sample(c("new", "old"), 100, replace = TRUE))
+  data$reward <- ifelse(data$action == "new", data$x, 0.5)
+  expect_snapshot(print(learn_fitted_q(data[-3])))
+  expect_snapshot(print(learn_q(data[-2])))
+  expect_error(predict(learn_q(data[-2]), data.frame(s = "mid")), "The rule knows no s \"mid\"")
+})
