@@ -21,7 +21,7 @@
 #' # Contexts and logged data
 #'
 #' `"linucb"` and `"thompson"` learn from logged steps, which have a context (the state), an action
-#' and a reward each: every action has a linear model of the context (with a ridge of 1). The data is
+#' and a reward each: every action has a linear model of the context (with a ridge of 1). Data is
 #' replayed (Li 2011): in each row the learner sees the context and chooses; only if it chooses the
 #' action of the data it sees the reward, and learns. If the data's actions were drawn with equal
 #' probabilities, the rewards that it saw are those that it would have got, on average. With the
@@ -76,9 +76,10 @@
 #' clicks <- data.frame(episode = 1:2000, age = runif(2000), action = sample(0:1, 2000, TRUE))
 #' clicks$reward <- rbinom(2000, 1, ifelse(clicks$action == 1, clicks$age, 0.5))
 #' learn_bandit(clicks, "linucb", seed = 1)
-learn_bandit <- function(env, method = c("epsilon_greedy", "ucb", "gradient", "linucb",
-                                         "thompson"), epsilon = 0.1, confidence = NULL, learning_rate = NULL, initial = 0, baseline = TRUE,
-                         learners = 2000, horizon = NULL, seed = NULL) {
+learn_bandit <- function(env,
+                         method = c("epsilon_greedy", "ucb", "gradient", "linucb", "thompson"),
+                         epsilon = 0.1, confidence = NULL, learning_rate = NULL, initial = 0,
+                         baseline = TRUE, learners = 2000, horizon = NULL, seed = NULL) {
   contextual <- c("linucb", "thompson")
   if (method[1L] %in% contextual) {
     check_number(confidence, min = 0, allow_null = TRUE)

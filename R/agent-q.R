@@ -44,9 +44,9 @@
 #'   For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
-#'   For `learn_q()` also logged steps, as for [learn_fitted_q()]: it then sweeps over all pairs of a
-#'   state and an action that the data has until no value changes (batch Q-learning), and takes only
-#'   `discount`, `double` and `iterations`, the largest number of sweeps.
+#'   For `learn_q()` also logged steps, as for [learn_fitted_q()]: it then sweeps over all pairs of
+#'   a state and an action that the data has until no value changes (batch Q-learning), and takes
+#'   only `discount`, `double` and `iterations`, the largest number of sweeps.
 #' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
 #'   `total_steps`, of which one is needed without a preset, `episodes` (in an iteration, 10 by
 #'   default), `target` or `seed`; and of the environment, such as `is_slippery = FALSE`.
