@@ -48,6 +48,9 @@ test_that("a training by Stable-Baselines3 is a training", {
 test_that("a checkpoint goes on with the remaining steps", {
   skip_unless_sb3()
   folder <- withr::local_tempdir()
+  # Stable-Baselines3 saves no model where it finds a folder of this name.
+  withr::local_dir(withr::local_tempdir())
+  dir.create("gym")
   learn <- function(...) learn_quickly("DQN", "CartPole-v1", ..., seed = 1, checkpoint = folder)
   begun <- learn(200)
   expect_message(trained <- learn(400), class = "gym_message_resumed")
