@@ -18,7 +18,7 @@ offline_policy <- function(policy, steps, folds, call) {
       )
     }
   }
-  if (!is.null(folds) && is.null(policy$recipe)) {
+  if (!is.null(folds) && !inherits(policy, "gym_policy_fitted")) {
     abort_argument(policy, "a rule of `learn_fitted_q()` or `learn_q()` if there are `folds`",
                    "policy", call)
   }

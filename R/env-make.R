@@ -159,6 +159,8 @@ explain_unknown_argument <- function(cnd, given, call) {
     return()
   }
   passed <- c(passed_on_by(name), list(gym_make = gym_make))
+  others <- passed[names(passed) != "gym_make"]
+  own <- arguments_of(if (length(others)) others else passed[1L])
   # The last one is an argument of all environments.
   choices <- c(arguments_of(passed), "max_episode_steps")
   gym_abort(
@@ -166,7 +168,7 @@ explain_unknown_argument <- function(cnd, given, call) {
       paste0("Neither `", names(passed)[[1L]], "()` nor the environment has an argument `", name,
              "`."),
       i = did_you_mean(name, choices) %||%
-        paste0("`", names(passed)[[1L]], "()` has ", quoted_names(arguments_of(passed[1L])),
+        paste0("`", names(passed)[[1L]], "()` has ", quoted_names(own),
                "; see the environment's documentation for those of its own.")
     ),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
@@ -175,12 +177,16 @@ explain_unknown_argument <- function(cnd, given, call) {
 }
 
 #' Find the functions that passed an argument on in their `...`
-#' @return A list of exported functions with their names, the one that the user called first.
+#' @return A list of exported functions with their names, the one that the user called first. What
+#'   makes and trains an agent also passes them on to the function that makes it.
 #' @noRd
 passed_on_by <- function(name) {
   exported <- mget(getNamespaceExports(topenv()), topenv(), "function", list(NULL))
   passed <- lapply(seq_len(sys.nframe() - 1L), function(at) {
     f <- sys.function(at)
+    if (identical(f, make_and_train)) {
+      return(mget(sys.frame(at)$make, topenv()))
+    }
     passes <- "..." %in% names(formals(f)) && name %in% evalq(...names(), sys.frame(at))
     if (passes) Filter(function(one) identical(one, f), exported)
   })
@@ -188,7 +194,7 @@ passed_on_by <- function(name) {
 }
 
 arguments_of <- function(functions) {
-  setdiff(unlist(lapply(functions, function(f) names(formals(f)))), c("env_id", "env", "x", "..."))
+  setdiff(unlist(lapply(functions, function(f) names(formals(f)))), c("env_id", "env", "agent", "x", "..."))
 }
 
 server_env <- R6Class(

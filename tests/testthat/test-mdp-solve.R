@@ -103,7 +103,8 @@ test_that("in a terminal state there is no best action, in tables and pictures",
   for (given in list(list(), list(policy = policy_table(matrix(c(1, 0), 4, 2, byrow = TRUE))))) {
     solved <- rlang::exec(solve_mdp, walk_model(), !!!given)
     cells <- ggplot2::autoplot(solved)$data
-    expect_identical(is.na(cells$action), c(TRUE, FALSE, FALSE, TRUE))
+    expect_identical(is.na(cells$action[cells$panel == "value"]), c(TRUE, FALSE, FALSE, TRUE))
+    expect_identical(cells$state[cells$panel == "action"], c(1, 2))
   }
 })
 

@@ -212,8 +212,9 @@ test_that("policies and functions stay, and results give theirs", {
 })
 
 test_that("what is no model is refused", {
-  expect_error(as_policy("left"), "or `nnet::nnet()`, not \"left\"", fixed = TRUE,
+  expect_error(as_policy("left"), "must be a file that exists, not \"left\"", fixed = TRUE,
                class = "gym_error_argument")
+  expect_error(as_policy(3), "or `nnet::nnet()`, not 3", fixed = TRUE, class = "gym_error_argument")
   cnd <- expect_error(as_policy(data.frame(a = 1)), "not a data frame with 1 row",
                       class = "gym_error_argument")
   expect_match(conditionMessage(cnd), "`predict = function(model, newdata) ...`", fixed = TRUE)

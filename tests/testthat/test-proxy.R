@@ -143,7 +143,7 @@ test_that("the unit's options are the server's", {
                 collapse = "\n")
   command <- sub(".*ExecStart=", "", sub("([^\\\\])\n.*", "\\1", sub(".*ExecStart=", "", unit)))
   options <- unique(regmatches(command, gregexpr("--[a-z-]+", command))[[1L]])
-  expect_gt(length(options), 4)
+  expect_gt(length(options), 3)
   help <- run_quietly(working_python(), c("-m", "gym_server", "--help"),
                       env = server_environment())$stdout
   for (option in options) expect_match(help, option, fixed = TRUE)

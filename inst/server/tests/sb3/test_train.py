@@ -1,11 +1,23 @@
-"""Jobs with errors, in one process: PyTorch takes seconds to import."""
+"""Jobs, in one process for all of them, because PyTorch takes seconds to import.
+
+It is a process of its own, as it is for users: PyTorch may crash where other tests have loaded
+libraries that draw.
+"""
 
 import threading
+from concurrent.futures import ProcessPoolExecutor
+from importlib.util import find_spec
+from multiprocessing import get_context
 
+import numpy as np
 import pytest
 
-pytestmark = pytest.mark.slow
-pytest.importorskip("sb3_contrib", reason="the extra sb3 is not installed")
+from gym_server.protocol import safetensors
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("sb3_contrib") is None, reason="the extra sb3 is not installed"),
+]
 
 JOB = {
     "algorithm": "PPO",
@@ -24,10 +36,43 @@ JOB = {
 }
 
 
+@pytest.fixture(scope="module")
+def child():
+    """Return a function that calls another one in the process with PyTorch."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        yield lambda *call, **kwargs: pool.submit(*call, **kwargs).result()
+
+
 def train(folder, **changes):
     from gym_server.sb3.train import train as run
 
     return run({**JOB, **changes}, folder, threading.Event())
+
+
+def error_of_training(folder, **changes):
+    try:
+        train(folder, **changes)
+    except Exception as error:
+        return in_words(error)
+    return None
+
+
+def in_words(error):
+    from gym_server.sb3.failures import in_words as words
+
+    return words(error)
+
+
+def steps_of(folder):
+    from gym_server.sb3 import checkpoints
+
+    return checkpoints.steps_of(folder)
+
+
+def has_gpu():
+    import torch
+
+    return torch.cuda.is_available()
 
 
 @pytest.mark.parametrize(
@@ -50,55 +95,40 @@ def train(folder, **changes):
         ({"env_id": "Blackjack-v1"}, None, "not supported"),
     ],
 )
-def test_what_is_wrong_is_said_before_anything_is_trained(changes, argument, words, tmp_path):
-    import torch
-
-    from gym_server.sb3.failures import in_words
-
-    if changes.get("device") == "cuda" and torch.cuda.is_available():
+def test_what_is_wrong_is_said_before_anything_is_trained(
+    changes, argument, words, tmp_path, child
+):
+    if changes.get("device") == "cuda" and child(has_gpu):
         pytest.skip("there is a GPU")
-    with pytest.raises(Exception) as caught:
-        train(tmp_path, **changes)
-    said = in_words(caught.value)
+    said = child(error_of_training, tmp_path, **changes)
     assert words in said["message"]
     assert said.get("argument") == argument
     assert not (tmp_path / "progress.csv").exists()
 
 
-def test_a_loss_that_is_nan_ends_the_training_and_finite_weights_are_kept(tmp_path):
-    import numpy as np
-
-    from gym_server.protocol import safetensors
-
-    result = train(
-        tmp_path, total_steps=2000, arguments={**JOB["arguments"], "learning_rate": 1e30}
-    )
+def test_a_loss_that_is_nan_ends_the_training_and_finite_weights_are_kept(tmp_path, child):
+    arguments = {**JOB["arguments"], "learning_rate": 1e30}
+    result = child(train, tmp_path, total_steps=2000, arguments=arguments)
     assert "NaN" in result["error"]["message"]
     assert not result["complete"]
     read = safetensors.read((tmp_path / "policy.safetensors").read_bytes())
     assert all(np.isfinite(tensor.array()).all() for tensor in read.tensors.values())
 
 
-def test_memory_that_does_not_suffice_is_said_in_words():
-    from gym_server.sb3.failures import in_words
-
-    said = in_words(MemoryError("Unable to allocate 1.5 TiB"))
+def test_memory_that_does_not_suffice_is_said_in_words(child):
+    said = child(in_words, MemoryError("Unable to allocate 1.5 TiB"))
     assert "The memory does not suffice" in said["message"]
     assert "buffer_size" in said["hint"]
 
 
-def test_a_training_goes_on_with_its_weights_steps_and_buffer(tmp_path):
-    import numpy as np
-
-    from gym_server.sb3 import checkpoints
-
+def test_a_training_goes_on_with_its_weights_steps_and_buffer(tmp_path, child):
     off_policy = {"learning_starts": 50, "buffer_size": 1000}
     changes = {"algorithm": "DQN", "arguments": off_policy, "checkpoint": True}
-    assert train(tmp_path, **changes)["begun"] == 0
-    assert checkpoints.steps_of(tmp_path) == 200
+    assert child(train, tmp_path, **changes)["begun"] == 0
+    assert child(steps_of, tmp_path) == 200
     with np.load(tmp_path / "checkpoint" / "buffer.npz") as buffer:
         assert len(buffer["rewards"]) == 200
-    result = train(tmp_path, **changes, total_steps=300)
+    result = child(train, tmp_path, **changes, total_steps=300)
     assert (result["begun"], result["steps"]) == (200, 300)
     with np.load(tmp_path / "checkpoint" / "buffer.npz") as buffer:
         assert len(buffer["rewards"]) == 300
