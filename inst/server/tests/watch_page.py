@@ -61,11 +61,6 @@ def complaints(browser):
     return [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
-def drawn(server, url):
-    """Return how often an environment was drawn; asking draws it, too, if it moved."""
-    return server.get(f"{url}/watch/state/")[1]["number"]
-
-
 def pace(server, url, seconds=1):
     """Return how many steps a second an environment takes; a watched one takes 50."""
     began, before = time.monotonic(), server.get(url)[1]["steps"]

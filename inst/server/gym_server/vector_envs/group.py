@@ -73,6 +73,7 @@ class Group:
             for env in sub_env.make_all(len(numbers)):
                 self.envs.append(env)
                 undo.callback(env.close)
+            self._check_spaces()
             undo.pop_all()
         self._observation_space = self.envs[0].observation_space
         # Of sub-environments that have not been drawn yet.
@@ -87,6 +88,17 @@ class Group:
         # The seeds of the episodes that each starts automatically, in reverse order; None for
         # endless episodes without seeds.
         self._seeds: list[list[int] | None] = [None] * len(numbers)
+
+    def _check_spaces(self) -> None:
+        first = self.envs[0]
+        for env in self.envs:
+            for name in ("observation_space", "action_space"):
+                space, wanted = getattr(env, name), getattr(first, name)
+                if space is not wanted and space != wanted:
+                    raise RuntimeError(
+                        f"its sub-environments differ: one has the {name} {wanted}, "
+                        f"another one {space}"
+                    )
 
     # Moves ----------------------------------------------------------------------------------
 

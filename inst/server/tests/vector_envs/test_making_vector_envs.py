@@ -139,9 +139,9 @@ def test_case_and_underscores_do_not_matter_in_an_autoreset_mode(client, mode, m
         ("num_envs", "4", "an integer, 1 or greater"),
         ("num_envs", True, "an integer, 1 or greater"),
         ("num_envs", [4], "an integer, 1 or greater"),
-        ("vectorization_mode", "fast", '"vector_entry_point", "sync" or "async"'),
-        ("vectorization_mode", 1, '"vector_entry_point", "sync" or "async"'),
-        ("autoreset_mode", "never", '"NextStep", "SameStep" or "Disabled"'),
+        ("vectorization_mode", "fast", "one of vector_entry_point, sync, async"),
+        ("vectorization_mode", 1, "one of vector_entry_point, sync, async"),
+        ("autoreset_mode", "never", "one of NextStep, SameStep, Disabled"),
         (
             "seed",
             [1, -1],
