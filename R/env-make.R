@@ -177,15 +177,17 @@ explain_unknown_argument <- function(cnd, given, call) {
 }
 
 #' Find the functions that passed an argument on in their `...`
-#' @return A list of exported functions with their names, the one that the user called first. What
-#'   makes and trains an agent also passes them on to the function that makes it.
+#' @return A list of exported functions with their names, the one that the user called first. A
+#'   frame of ours with the string `make` also passes them on to the function of that name.
 #' @noRd
 passed_on_by <- function(name) {
   exported <- mget(getNamespaceExports(topenv()), topenv(), "function", list(NULL))
   passed <- lapply(seq_len(sys.nframe() - 1L), function(at) {
     f <- sys.function(at)
-    if (identical(f, make_and_train)) {
-      return(mget(sys.frame(at)$make, topenv()))
+    is_ours <- identical(environment(f), topenv())
+    make <- if (is_ours) get0("make", sys.frame(at), inherits = FALSE)
+    if (rlang::is_string(make)) {
+      return(mget(make, topenv()))
     }
     passes <- "..." %in% names(formals(f)) && name %in% evalq(...names(), sys.frame(at))
     if (passes) Filter(function(one) identical(one, f), exported)
@@ -194,7 +196,10 @@ passed_on_by <- function(name) {
 }
 
 arguments_of <- function(functions) {
-  setdiff(unlist(lapply(functions, function(f) names(formals(f)))), c("env_id", "env", "agent", "x", "..."))
+  setdiff(
+    unlist(lapply(functions, function(f) names(formals(f)))),
+    c("env_id", "env", "agent", "x", "...")
+  )
 }
 
 server_env <- R6Class(

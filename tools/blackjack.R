@@ -1,4 +1,4 @@
-# Draws vignettes/blackjack.png, which the page of chapter 5 shows, by the code of that page.
+# Draws vignettes/articles/blackjack.png, which the page of chapter 5 shows, by the code of that page.
 #
 #   tools/in-env Rscript --no-init-file tools/blackjack.R
 #
@@ -11,7 +11,7 @@ learned <- learn_monte_carlo(
   target = Inf, eval_every = 1000, eval_episodes = 10000
 )
 print(learned)
-file <- "vignettes/blackjack.png"
+file <- "vignettes/articles/blackjack.png"
 grDevices::png(file, width = 7, height = 3.6, units = "in", res = 64)
 plot(decision_map("Blackjack-v1", learned, "dealer_card", "player_sum", xlim = c(1, 10),
                   ylim = c(12, 21)))

@@ -107,7 +107,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "spaces": testthat("round-trips", GYM_TEST_SPACES=300),
         "futures": testthat("play-futures", GYM_TEST_ALL="true", GYM_TEST_FUTURES="all"),
         "hosts": testthat("hosts", GYM_TEST_ALL="true", GYM_TEST_HOSTS="all"),
-        "book": testthat("book-vignettes", GYM_TEST_BOOK="all"),
+        "book": testthat("book-articles", GYM_TEST_BOOK="all"),
         "tables": testthat("learn-table", GYM_TEST_TABLES="all"),
         "coverage": r("coverage", 50 if quick else 2000),
         "soak": python("soak", lasting(1800, 60)),
