@@ -104,7 +104,7 @@ test_that("in a terminal state there is no best action, in tables and pictures",
     solved <- rlang::exec(solve_mdp, walk_model(), !!!given)
     cells <- ggplot2::autoplot(solved)$data
     expect_identical(is.na(cells$action[cells$panel == "value"]), c(TRUE, FALSE, FALSE, TRUE))
-    expect_identical(cells$state[cells$panel == "action"], c(1, 2))
+    expect_identical(cells$state[cells$panel == "action"], 1:2)
   }
 })
 
