@@ -1,4 +1,4 @@
-# Draws vignettes/articles/blackjack.png, which the page of chapter 5 shows, by the code of that page.
+# Draws vignettes/articles/blackjack.png, which the page of chapter 5 shows, by that page's code.
 #
 #   tools/in-env Rscript --no-init-file tools/blackjack.R
 #
