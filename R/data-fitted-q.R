@@ -198,10 +198,10 @@ best_update <- function(prepared, regression, fit, step, discount) {
   fit_targets(prepared, regression, ahead, step, discount)
 }
 
-# A fit is then a list of two, one of each half of the episodes.
+# A fit is then two, one of each half of the episodes.
 double_update <- function(prepared, regression, fit, step, discount) {
   half <- prepared$episode %% 2L
-  lapply(0:1, function(own) {
+  fits <- lapply(0:1, function(own) {
     ahead <- if (!is.null(fit)) {
       chooses <- known_values(regression$values(fit[[own + 1L]], prepared$after))
       valued <- regression$values(fit[[2L - own]], prepared$after)
@@ -210,6 +210,7 @@ double_update <- function(prepared, regression, fit, step, discount) {
     }
     fit_targets(prepared, regression, ahead, step, discount, half == own)
   })
+  structure(fits, class = "gym_double_fit")
 }
 
 known_values <- function(q) {
@@ -223,8 +224,7 @@ best_next_values <- function(regression, fit, block) {
 }
 
 fit_values <- function(regression, fit, block) {
-  # Of double Q-learning.
-  if (is.list(fit) && length(fit) == 2L && is.null(attributes(fit))) {
+  if (inherits(fit, "gym_double_fit")) {
     return((regression$values(fit[[1L]], block) + regression$values(fit[[2L]], block)) / 2)
   }
   regression$values(fit, block)
@@ -313,7 +313,7 @@ act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
     names(columns) <- policy$states
   }
   actions <- predict_policy(policy, columns, "action", vector_env$call)
-  encoded_values(vector_env$action_space, actions, "the action", vector_env$call)
+  encoded_values(vector_env$action_space, actions, "action", vector_env$call)
 }
 
 #' @export
@@ -361,8 +361,7 @@ rule_lines <- function(x) {
   }
   if (!is.null(regression$states) && nrow(regression$states) <= 12L && length(x$fits) == 1L) {
     best <- best_known(x, rule_values(x, regression$states))
-    states <- do.call(paste, c(unname(lapply(regression$states, as.character)), sep = ", "))
-    return(paste0(states, ": ", x$actions[best]))
+    return(paste0(row_texts(regression$states), ": ", x$actions[best]))
   }
   character()
 }

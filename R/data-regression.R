@@ -106,7 +106,7 @@ table_regression <- function(steps) {
 }
 
 # Texts that are the same for the same state.
-row_keys <- function(states) do.call(paste, c(unname(lapply(states, as.character)), sep = "\r"))
+row_keys <- function(states) row_texts(states, sep = "\r")
 
 solve_values <- function(moves, reward, call) {
   identity <- if (is.matrix(moves)) diag(nrow(moves)) else Matrix::Diagonal(nrow(moves))

@@ -132,7 +132,7 @@ learn_sb3 <- function(algorithm, env, total_steps = NULL, ..., policy = NULL,
     settings["seed"] <- list(seed)
     own <- files
     places <- !vapply(own, is.null, NA) & names(own) != "resume"
-    own[places] <- file.path(own[places], paste0("seed-", format(seed, scientific = FALSE)))
+    own[places] <- folder_of_seed(own[places], seed)
     training <- train_sb3(settings, own, python, progress, client, call)
     trainings <- c(trainings, list(training))
     if (training$interrupted) break

@@ -64,16 +64,10 @@ sb3_evaluations <- function(folder) {
     played <- from_json(line)
     episodes <- data.frame(return = as.numeric(unlist(played$returns)),
                            length = as.integer(unlist(played$lengths)))
-    evaluation_row(played$iteration, "curve", evaluate_episodes(episodes, policy_random()))
+    evaluation <- evaluate_episodes(episodes, policy_random())
+    evaluation_row(as.integer(played$iteration), "curve", evaluation)
   })
   do.call(rbind, c(list(no_evaluations), rows))
-}
-
-evaluation_row <- function(iteration, kind, evaluation) {
-  row <- data.frame(iteration = as.integer(iteration), kind = kind)
-  of_policy <- setdiff(names(no_evaluations), names(row))
-  row[of_policy] <- unclass(evaluation)[of_policy]
-  row
 }
 
 #' Make the result of a training

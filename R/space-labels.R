@@ -16,7 +16,12 @@ value_labels <- function(space) {
   if (is.null(space$values)) {
     return(as.character(state_numbers(space)))
   }
-  do.call(paste, c(unname(lapply(space$values, as.character)), sep = ", "))
+  row_texts(space$values)
+}
+
+# A text for each row of a data frame.
+row_texts <- function(rows, sep = ", ") {
+  do.call(paste, c(unname(lapply(rows, as.character)), sep = sep))
 }
 
 # The values of these numbers: a data frame of the columns of states.
@@ -37,7 +42,7 @@ named_numbers <- function(space, numbers) {
 
 #' Return the numbers of some values
 #' @param x A vector of values or their labels, or a data frame with the columns of the values.
-#' @param what What they are, for the error, such as `"the state"`.
+#' @param what What they are, for the error, such as `"state"`.
 #' @noRd
 encoded_values <- function(space, x, what, call) {
   if (is.null(space$values)) {
@@ -45,8 +50,7 @@ encoded_values <- function(space, x, what, call) {
   }
   if (is.data.frame(x)) {
     check_columns(x, names(space$values), what, call)
-    x <- do.call(paste, c(unname(lapply(as.list(x)[names(space$values)], as.character)),
-                          sep = ", "))
+    x <- row_texts(as.data.frame(x)[names(space$values)])
   }
   place <- match(as.character(x), value_labels(space))
   if (anyNA(place)) {

@@ -99,13 +99,21 @@ evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
       evaluate_exactly(settings$model, policy, settings$max_steps)
     }
     played <- exact %||% play_evaluation(state, vector_env, settings, policy, episodes, final)
-    cbind(data.frame(iteration = state$iteration, kind = kind), played[-1L])
+    evaluation_row(state$iteration, kind, played)
   }
   row.names(row) <- NULL
   state$evaluations[[length(state$evaluations) + 1L]] <- row
   if (state$iteration > 0L && !final) {
     state$history[[state$iteration]]$evaluation <- row$mean_return
   }
+  row
+}
+
+# A row of a training's evaluations, from the only row of an evaluation.
+evaluation_row <- function(iteration, kind, evaluation) {
+  row <- data.frame(iteration = iteration, kind = kind)
+  of_policy <- setdiff(names(no_evaluations), names(row))
+  row[of_policy] <- unclass(evaluation)[of_policy]
   row
 }
 

@@ -209,6 +209,10 @@ run_of_seed <- function(settings, seed, files, call) {
       substr(files$checkpoint, 1L, end - 1L), "-", text, substring(files$checkpoint, end)
     )
   }
-  if (!is.null(files$log)) files$log <- file.path(files$log, paste0("seed-", text))
+  if (!is.null(files$log)) files$log <- folder_of_seed(files$log, seed)
   new_run(settings, files, call)
+}
+
+folder_of_seed <- function(folder, seed) {
+  file.path(folder, paste0("seed-", format(seed, scientific = FALSE)))
 }

@@ -67,6 +67,15 @@ local_proxy <- function(server, keepalive = TRUE, frame = parent.frame()) {
   )
 }
 
+# The same before a server of its own that asks for a token; also returns both, and a client.
+local_proxied_server <- function(frame = parent.frame()) {
+  server <- local_locked_server(allow_host = "gym.example.org", frame = frame)
+  proxy <- local_proxy(server, frame = frame)
+  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
+  expect_identical(await_answer(client)$status, "ok")
+  c(proxy, list(server = server, client = client))
+}
+
 # Waits until nginx has started: before that it does not answer.
 await_answer <- function(client, seconds = 10) {
   deadline <- Sys.time() + seconds

@@ -1,15 +1,3 @@
-# Three states and two actions, whose values solve_mdp() knows.
-small_model <- function() {
-  gym_model(data.frame(
-    state = c(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2), action = c(0, 0, 1, 1),
-    next_state = c(0, 1, 1, 2, 0, 2, 2, 3, 1, 0, 2, 3),
-    probability = c(0.7, 0.3, 0.6, 0.4, 0.5, 0.5, 0.8, 0.2, 0.9, 0.1, 0.5, 0.5),
-    reward = c(0, 1, -1, 2, 0, 1, 1, 3, 0, -1, 2, 5)
-  ), start = c(`0` = 0.5, `1` = 0.3, `2` = 0.2))
-}
-behaves <- rbind(c(0.5, 0.5), c(0.4, 0.6), c(0.6, 0.4), c(0.5, 0.5))
-target <- rbind(c(0.3, 0.7), c(0.6, 0.4), c(0.4, 0.6), c(1, 0))
-by_table <- function(p) function(states) p[states[[1L]] + 1, ]
 logged <- function(episodes, seed = 1, ...) {
   policy <- policy_table(log(behaves), temperature = 1)
   steps_data(rollout(small_model(), policy, episodes = episodes, seed = seed, steps = TRUE, ...))
@@ -18,9 +6,9 @@ logged <- function(episodes, seed = 1, ...) {
 test_that("all methods estimate the exact value, with and without a horizon", {
   steps <- logged(3000)
   for (horizon in list(NULL, 5)) {
-    exact <- solve_mdp(small_model(), target, discount = 0.9, horizon = horizon)$start_value
+    exact <- solve_mdp(small_model(), wanted, discount = 0.9, horizon = horizon)$start_value
     found <- evaluate_offline(
-      steps, by_table(target), behavior = by_table(behaves), discount = 0.9, horizon = horizon,
+      steps, by_table(wanted), behavior = by_table(behaves), discount = 0.9, horizon = horizon,
       replicates = 50, seed = 1
     )$estimates
     expect_lt(max(abs(found$estimate - exact) / found$se), 3.5)
@@ -30,7 +18,7 @@ test_that("all methods estimate the exact value, with and without a horizon", {
 
 test_that("weighted estimates are those of their papers", {
   steps <- steps_of(logged(40))
-  act <- list(here = by_table(target)(steps$state))
+  act <- list(here = by_table(wanted)(steps$state))
   chosen <- by_table(behaves)(steps$state)[cbind(seq_along(steps$step), steps$action)]
   q <- list(taken = sin(seq_along(chosen)), state = cos(seq_along(chosen)))
   design <- list(steps = steps, act = act, discount = 0.9, horizon = NULL, call = NULL)
@@ -83,9 +71,9 @@ test_that("fitted Q evaluation of a table is the value in the model of the steps
   estimated <- estimate_model(steps)
   linear <- ~ action * factor(obs_1)
   for (horizon in list(NULL, 6)) {
-    exact <- solve_mdp(estimated, target[1:3, ], discount = 0.95, horizon = horizon)$start_value
+    exact <- solve_mdp(estimated, wanted[1:3, ], discount = 0.95, horizon = horizon)$start_value
     by <- function(formula, model = NULL) {
-      evaluate_offline(steps, by_table(target), "fqe", formula = formula, model = model,
+      evaluate_offline(steps, by_table(wanted), "fqe", formula = formula, model = model,
                        discount = 0.95, horizon = horizon, seed = 1, replicates = 2)
     }
     expect_equal(by(NULL)$estimates$estimate, exact, tolerance = 1e-10)
@@ -98,14 +86,14 @@ test_that("fitted Q evaluation of a table is the value in the model of the steps
 test_that("cut episodes need a horizon, except for fitted Q evaluation", {
   cut <- logged(300, max_steps = 4)
   expect_error(
-    evaluate_offline(cut, by_table(target), discount = 0.9), "cut off, the first after 4 steps"
+    evaluate_offline(cut, by_table(wanted), discount = 0.9), "cut off, the first after 4 steps"
   )
-  exact <- solve_mdp(small_model(), target, discount = 0.9)$start_value
-  found <- evaluate_offline(cut, by_table(target), "fqe", discount = 0.9, seed = 1, replicates = 30)
+  exact <- solve_mdp(small_model(), wanted, discount = 0.9)$start_value
+  found <- evaluate_offline(cut, by_table(wanted), "fqe", discount = 0.9, seed = 1, replicates = 30)
   expect_lt(abs(found$estimates$estimate - exact) / found$estimates$se, 3.5)
   expect_true(is.na(found$observed$estimate))
   expect_silent(evaluate_offline(
-    cut, by_table(target), "wis", horizon = 4, replicates = 10, seed = 1
+    cut, by_table(wanted), "wis", horizon = 4, replicates = 10, seed = 1
   ))
 })
 
@@ -124,10 +112,10 @@ test_that("a rule that was learned from the same episodes needs folds", {
 
 test_that("behavior is estimated again in each replicate", {
   steps <- logged(200)
-  known <- evaluate_offline(steps, by_table(target), c("is", "dr"), behavior = by_table(behaves),
+  known <- evaluate_offline(steps, by_table(wanted), c("is", "dr"), behavior = by_table(behaves),
                             seed = 1, replicates = 100, discount = 0.9)
   by <- function(behavior) {
-    evaluate_offline(steps, by_table(target), c("is", "dr"), behavior = behavior, seed = 1,
+    evaluate_offline(steps, by_table(wanted), c("is", "dr"), behavior = behavior, seed = 1,
                      replicates = 100, discount = 0.9)$estimates
   }
   shares <- by(NULL)
@@ -138,10 +126,10 @@ test_that("behavior is estimated again in each replicate", {
 })
 
 test_that("t intervals are those of a mean", {
-  found <- evaluate_offline(logged(50), by_table(target), "pdis", behavior = by_table(behaves),
+  found <- evaluate_offline(logged(50), by_table(wanted), "pdis", behavior = by_table(behaves),
                             interval = "t", seed = 1, discount = 0.9)
   scores <- episode_scores(weighted_parts(
-    list(steps = steps_of(logged(50)), act = list(here = by_table(target)(logged(50)["obs_1"])),
+    list(steps = steps_of(logged(50)), act = list(here = by_table(wanted)(logged(50)["obs_1"])),
          discount = 0.9, horizon = NULL, call = NULL), NULL,
     by_table(behaves)(logged(50)["obs_1"])[cbind(seq_len(nrow(logged(50))), logged(50)$action + 1)]
   ), "pdis")
@@ -188,7 +176,7 @@ test_that("invalid arguments are errors that say what to do", {
 })
 
 test_that("estimates print and plot", {
-  found <- evaluate_offline(logged(100), by_table(target), behavior = by_table(behaves),
+  found <- evaluate_offline(logged(100), by_table(wanted), behavior = by_table(behaves),
                             discount = 0.9, horizon = 3, seed = 1, replicates = 20)
   expect_output(print(found), "observed.*Effective episodes: .*largest weights")
   picture <- ggplot2::ggplot_build(ggplot2::autoplot(found))

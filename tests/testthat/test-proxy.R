@@ -1,9 +1,8 @@
 test_that("by nginx and TLS a client plays as it does without", {
   skip_if_no_nginx()
-  server <- local_locked_server(allow_host = "gym.example.org")
-  proxy <- local_proxy(server)
-  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
-  expect_identical(await_answer(client)$status, "ok")
+  proxy <- local_proxied_server()
+  server <- proxy$server
+  client <- proxy$client
 
   play <- function(client, ...) {
     env <- local_env(seed = 1, client = client, ...)
@@ -41,10 +40,9 @@ test_that("by nginx and TLS a client plays as it does without", {
 test_that("by nginx the watch page waits for what is new, and no log has its key", {
   skip_unless_all()
   skip_if_no_nginx()
-  server <- local_locked_server(allow_host = "gym.example.org")
-  proxy <- local_proxy(server)
-  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
-  expect_identical(await_answer(client)$status, "ok")
+  proxy <- local_proxied_server()
+  server <- proxy$server
+  client <- proxy$client
   withr::local_options(gym.viewer = FALSE)
   env <- local_env(client = client)
   env$reset(seed = 1)
@@ -79,10 +77,8 @@ test_that("by nginx the watch page waits for what is new, and no log has its key
 test_that("by nginx a stream is opened, which says its layout", {
   skip_unless_all()
   skip_if_no_nginx()
-  server <- local_locked_server(allow_host = "gym.example.org")
-  proxy <- local_proxy(server)
-  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
-  expect_identical(await_answer(client)$status, "ok")
+  proxy <- local_proxied_server()
+  client <- proxy$client
   env <- local_env(client = client)
 
   handle <- curl::new_handle(
@@ -152,10 +148,9 @@ test_that("the unit's options are the server's", {
 test_that("a proxy whose server is gone is distinguished from one that is no Gym server", {
   skip_unless_all()
   skip_if_no_nginx()
-  server <- local_locked_server(allow_host = "gym.example.org")
-  proxy <- local_proxy(server)
-  client <- create_GymClient(proxy$url, config = proxy$config, token = token_text)
-  expect_identical(await_answer(client)$status, "ok")
+  proxy <- local_proxied_server()
+  server <- proxy$server
+  client <- proxy$client
   expect_error(
     env_create(client, "CartPole-v1", kwargs = list(x = strrep("x", 17 * 2^20))), "the proxy",
     class = "gym_error_http_413"

@@ -5,7 +5,7 @@
 # Data sets of 200 episodes are drawn from a model whose values solve_mdp() knows. A row of the
 # table is a method in a setting. `expected` marks rows whose theory says that the interval covers:
 # it fails if one of these lies outside of the interval in which the shares of all of them would lie
-# in 99 of 100 studies. FOLDER gets coverage.csv, which the vignette shows.
+# in 99 of 100 studies. FOLDER gets coverage.csv, the table.
 
 library(gym)
 arguments <- commandArgs(TRUE)
@@ -14,15 +14,8 @@ replicates <- if (length(arguments) > 1L) as.integer(arguments[[2L]]) else 400L
 episodes <- 200L
 discount <- 0.9
 
-model <- gym_model(data.frame(
-  state = c(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2), action = c(0, 0, 1, 1),
-  next_state = c(0, 1, 1, 2, 0, 2, 2, 3, 1, 0, 2, 3),
-  probability = c(0.7, 0.3, 0.6, 0.4, 0.5, 0.5, 0.8, 0.2, 0.9, 0.1, 0.5, 0.5),
-  reward = c(0, 1, -1, 2, 0, 1, 1, 3, 0, -1, 2, 5)
-), start = c(`0` = 0.5, `1` = 0.3, `2` = 0.2))
-behaves <- rbind(c(0.5, 0.5), c(0.4, 0.6), c(0.6, 0.4), c(0.5, 0.5))
-target <- rbind(c(0.3, 0.7), c(0.6, 0.4), c(0.4, 0.6), c(1, 0))
-by_table <- function(p) function(states) p[states[[1L]] + 1, ]
+source("tests/testthat/helper-small-model.R")
+model <- small_model()
 
 # One rollout plays the episodes of all data sets.
 played <- rollout(
@@ -50,14 +43,14 @@ settings <- list(
 
 study <- function(name) {
   setting <- settings[[name]]
-  exact <- solve_mdp(model, target, discount = discount, horizon = setting$horizon)$start_value
+  exact <- solve_mdp(model, wanted, discount = discount, horizon = setting$horizon)$start_value
   given <- utils::modifyList(
     list(behavior = by_table(behaves), method = all, replicates = replicates),
     setting[setdiff(names(setting), "expected")], keep.null = TRUE
   )
   found <- lapply(seq_along(data), function(i) {
     suppressWarnings(do.call(evaluate_offline, c(
-      list(data[[i]], by_table(target), discount = discount, seed = i), given
+      list(data[[i]], by_table(wanted), discount = discount, seed = i), given
     )))$estimates
   })
   found <- do.call(rbind, found)

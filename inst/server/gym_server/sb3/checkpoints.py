@@ -62,27 +62,13 @@ def _place(folder: Path) -> Path | None:
     return next((place for place in places if (place / "state.json").exists()), None)
 
 
-def _state(folder: Path) -> dict[str, Any]:
+def state_of(folder: Path) -> dict[str, Any]:
+    """Return the counters of the model, its rows and seconds; empty without a checkpoint."""
     place = _place(folder)
     if place is None:
         return {}
     found: dict[str, Any] = json.loads((place / "state.json").read_text(encoding="utf-8"))
     return found
-
-
-def steps_of(folder: Path) -> int:
-    """Return the steps that were trained before."""
-    return int(_state(folder).get("num_timesteps", 0))
-
-
-def elapsed_of(folder: Path) -> float:
-    """Return the seconds that were trained before."""
-    return float(_state(folder).get("elapsed", 0.0))
-
-
-def rows_of(folder: Path) -> int:
-    """Return the rows that were written before."""
-    return int(_state(folder).get("rows", 0))
 
 
 def restore(model: BaseAlgorithm, folder: Path) -> None:
@@ -97,7 +83,7 @@ def restore(model: BaseAlgorithm, folder: Path) -> None:
     for name, value in (variables or {}).items():
         # As in BaseAlgorithm.load(): the optimizer of a variable refers to it.
         recursive_setattr(model, f"{name}.data", value.data)
-    for name, value in _state(folder).items():
+    for name, value in state_of(folder).items():
         if name in _COUNTERS:
             setattr(model, name, value)
     if (env := model.get_vec_normalize_env()) is not None:

@@ -82,7 +82,7 @@ def _actions(said: dict[str, Any]) -> int | None:
     kind = str(space.get(":type:", ""))
     if "Box" in kind:
         return None
-    if "'gym.spaces.discrete.Discrete'" in kind or ".discrete.Discrete'" in kind:
+    if ".discrete.Discrete'" in kind:
         if int(space.get("start", 0) or 0) != 0:
             raise NotANetworkError("its first action is not 0")
         return int(space["n"])

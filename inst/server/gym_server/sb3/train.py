@@ -54,12 +54,13 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
     if job["normalize"]:
         chosen = job["normalize"] if isinstance(job["normalize"], dict) else {}
         env = VecNormalize(env, **{"gamma": arguments.get("gamma", 0.99), **chosen})
-    begun = checkpoints.steps_of(folder)
+    before = checkpoints.state_of(folder)
+    begun = before.get("num_timesteps", 0)
     model = _model(make, env, arguments, job, job["seed"] + begun)
     _check_comes_back(model, job)
     checkpoints.restore(model, folder)
     model.set_logger(configure(str(folder), ["csv"]))
-    callback = _Callback(job, folder, stopping)
+    callback = _Callback(job, folder, stopping, before)
     # DQN, for instance, ends its exploration after a share of the whole.
     remaining = max(job["total_steps"] - begun, 0)
     error = None
@@ -119,14 +120,16 @@ def _model(
 class _Callback(BaseCallback):
     """Writes rows, evaluates, keeps checkpoints, and ends the training when that is asked for."""
 
-    def __init__(self, job: dict[str, Any], folder: Path, stopping: threading.Event) -> None:
+    def __init__(
+        self, job: dict[str, Any], folder: Path, stopping: threading.Event, before: dict[str, Any]
+    ) -> None:
         super().__init__()
         self.job, self.folder, self.stopping = job, folder, stopping
         self.episodes: list[tuple[float, float]] = []
-        self.rows = checkpoints.rows_of(folder)
+        self.rows = before.get("rows", 0)
         self.row_at = self.evaluated_at = 0
         self.every = max(job["total_steps"] // _ROWS, 1)
-        self.elapsed = checkpoints.elapsed_of(folder)
+        self.elapsed = before.get("elapsed", 0.0)
         self.began = time.monotonic()
         self.finite: dict[str, torch.Tensor] = {}
         self.eval_env: VecEnv | None = None

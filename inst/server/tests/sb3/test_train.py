@@ -66,7 +66,7 @@ def in_words(error):
 def steps_of(folder):
     from gym_server.sb3 import checkpoints
 
-    return checkpoints.steps_of(folder)
+    return checkpoints.state_of(folder)["num_timesteps"]
 
 
 def has_gpu():
