@@ -10,6 +10,7 @@ from __future__ import annotations
 import faulthandler
 import logging
 import os
+import signal
 import threading
 import time
 
@@ -40,6 +41,14 @@ def end_when_stuck(seconds: float) -> None:
 
     if seconds:
         threading.Thread(target=watch, name="heartbeat", daemon=True).start()
+        if hasattr(signal, "SIGTSTP"):
+            signal.signal(signal.SIGTSTP, lambda *_: _pause())
+
+
+def _pause() -> None:
+    # By Ctrl-Z in a terminal. Time goes on for faulthandler while no thread can put off the end.
+    faulthandler.cancel_dump_traceback_later()
+    os.kill(os.getpid(), signal.SIGSTOP)
 
 
 def _beat(seconds: float) -> None:

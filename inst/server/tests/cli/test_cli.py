@@ -64,6 +64,19 @@ def test_ctrl_c_stops_it_and_the_port_is_free_again_at_once(serve):
     assert again.port == port
 
 
+@needs_signals
+def test_a_server_that_was_paused_by_ctrl_z_goes_on(serve):
+    server = serve("--max-call-seconds", "3")
+    url = server.create("CartPole-v1")
+    server.process.send_signal(signal.SIGTSTP)
+    time.sleep(1)
+    # Linux ignores the first one in a process that no terminal controls.
+    server.process.send_signal(signal.SIGSTOP)
+    time.sleep(5)
+    server.process.send_signal(signal.SIGCONT)
+    assert server.post(f"{url}/reset/")[0] == 200
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7"])
 def test_only_this_machine_is_served_unless_asked(host, capsys, monkeypatch):
     monkeypatch.delenv("GYM_SERVER_TOKEN", raising=False)
