@@ -110,7 +110,8 @@ fit_rule <- function(steps, recipe, call) {
   }
   update <- if (recipe$double) double_update else best_update
   prepared <- prepare_steps(steps, regression, recipe$stages)
-  if (recipe$table) prepared <- equal_steps_together(prepared)
+  if (recipe$table) prepared <- equal_steps_together(prepared, recipe$double)
+  prepared <- weigh_steps(prepared, rep(1, length(steps$step)))
   fits <- iterate_fits(
     function(fit, step) update(prepared, regression, fit, step, recipe$discount),
     recipe$horizon, recipe$iterations,
@@ -141,16 +142,27 @@ prepare_steps <- function(steps, regression, stages) {
   steps
 }
 
-# Steps of a table that start and end in the same way, with their mean reward and their number.
-equal_steps_together <- function(prepared) {
-  each <- c("episode", "here", "action", "after", "ends", "known")
-  prepared$episode <- prepared$episode %% 2L
+# Steps of a table that start and end in the same way become one. `group` tells which.
+equal_steps_together <- function(prepared, double = FALSE) {
+  each <- c("here", "action", "after", "ends", "known", if (prepared$stages) "step",
+            if (double) "episode")
+  if (double) prepared$episode <- prepared$episode %% 2L
   key <- do.call(paste, prepared[each])
-  group <- match(key, unique(key))
-  prepared$reward <- rowsum(prepared$reward, group)[, 1L] / tabulate(group)
-  prepared$weight <- tabulate(group)
-  first <- !duplicated(group)
+  prepared$group <- match(key, unique(key))
+  prepared$each_reward <- prepared$reward
+  first <- !duplicated(prepared$group)
   prepared[each] <- lapply(prepared[each], function(x) x[first])
+  prepared
+}
+
+# Equal steps get the sum of their weights and the mean of their rewards.
+weigh_steps <- function(prepared, weight) {
+  prepared$weight <- weight
+  if (!is.null(prepared$group)) {
+    sums <- rowsum(cbind(weight, weight * prepared$each_reward), prepared$group)
+    prepared$weight <- sums[, 1L]
+    prepared$reward <- sums[, 2L] / sums[, 1L]
+  }
   prepared
 }
 
@@ -179,13 +191,14 @@ iterate_fits <- function(update, horizon, iterations, values_of) {
 
 #' Fit the reward plus the value of the next state
 #' @param ahead The value of each step's next state; `NULL` if nothing comes after this step.
-#' @param weight The weight of each step.
+#' @param used Which steps to use.
 #' @noRd
-fit_targets <- function(prepared, regression, ahead, step, discount, weight = 1) {
+fit_targets <- function(prepared, regression, ahead, step, discount, used = TRUE) {
   target <- prepared$reward
-  weight <- rep_len(weight * (prepared$weight %||% 1), length(target))
+  weight <- prepared$weight * used
   if (!is.null(ahead)) {
-    target <- target + ifelse(prepared$ends | !prepared$known, 0, discount * ahead)
+    ahead[prepared$ends | !prepared$known] <- 0
+    target <- target + discount * ahead
     # What came after the end of the records is not known.
     weight[!prepared$ends & !prepared$known] <- 0
   }

@@ -3,13 +3,12 @@
 
 #' Fit the values of the policy
 #'
-#' @param prepared As [prepare_steps()] returns it.
-#' @param weight The weight of each step.
+#' @param prepared As [weigh_steps()] returns it.
 #' @param next_at A function of a step that returns the policy's probabilities in the next states.
 #' @param start A fit to start from, or `NULL`.
 #' @return A list of fits, one for each step of a horizon, or a single one.
 #' @noRd
-policy_fits <- function(design, prepared, weight, next_at, start = NULL) {
+policy_fits <- function(design, prepared, next_at, start = NULL) {
   regression <- design$regression
   discount <- design$discount
   if (is.null(design$horizon) && !is.null(regression$fixed)) {
@@ -17,7 +16,7 @@ policy_fits <- function(design, prepared, weight, next_at, start = NULL) {
     go_on <- ifelse(prepared$ends | !usable, 0, discount)
     return(list(regression$fixed(
       prepared$here, prepared$after, prepared$action, prepared$reward, go_on, next_at(NA),
-      weight * usable, design$call
+      prepared$weight * usable, design$call
     )))
   }
   # Steps are the last one, the one before, and so on. No policy here counts them unless `stages`
@@ -31,7 +30,7 @@ policy_fits <- function(design, prepared, weight, next_at, start = NULL) {
     function(fit, step) {
       # Without a horizon the fit to start from, if there is one, saves iterations.
       fit <- if (is.na(step)) fit %||% start else fit
-      fit_targets(prepared, regression, ahead_of(fit, step), step, discount, weight)
+      fit_targets(prepared, regression, ahead_of(fit, step), step, discount)
     },
     design$horizon, most_evaluations, function(fit) ahead_of(fit, NA)
   )
@@ -65,18 +64,23 @@ values_by_step <- function(regression, fits, block, step, actions) {
 prepare_fqe <- function(design) {
   lapply(sort(unique(design$stratum)), function(own) {
     rows <- which(design$stratum[design$steps$episode] == own)
-    prepared <- prepare_steps(steps_in(design$steps, rows), design$regression, design$stages)
-    first <- which(prepared$step == 1L)
-    next_at <- once_per_key(function(step) design$act$after(own, step)[rows, , drop = FALSE])
-    fitting <- list(
-      prepared = prepared, next_at = next_at, first = first,
-      first_block = design$regression$block(prepared$state[first, , drop = FALSE]),
-      first_p = design$act$here[rows[first], , drop = FALSE],
-      share = mean(design$stratum == own)
-    )
-    fitting$fit <- policy_fits(design, prepared, rep(1, length(rows)), next_at)
-    fitting
+    first <- rows[design$steps$step[rows] == 1L]
+    c(fitting_of(design, own, rows), list(
+      starts = design$steps$episode[first],
+      first_block = design$regression$block(design$steps$state[first, , drop = FALSE]),
+      first_p = design$act$here[first, , drop = FALSE], share = mean(design$stratum == own)
+    ))
   })
+}
+
+# The fit to some rows by the rule of a stratum, and what fits it again.
+fitting_of <- function(design, own, rows) {
+  prepared <- prepare_steps(steps_in(design$steps, rows), design$regression, design$stages)
+  if (!is.null(design$regression$states)) prepared <- equal_steps_together(prepared)
+  rows <- rows[!duplicated(prepared$group %||% rows)]
+  next_at <- once_per_key(function(step) design$act$after(own, step)[rows, , drop = FALSE])
+  prepared <- weigh_steps(prepared, rep(1, length(prepared$episode)))
+  list(prepared = prepared, next_at = next_at, fit = policy_fits(design, prepared, next_at))
 }
 
 # What is needed in each replicate is computed once.
@@ -92,16 +96,15 @@ once_per_key <- function(f) {
 # The value of the policy if each episode counts this often.
 fitted_value <- function(design, fitting, count) {
   sum(vapply(fitting, function(own) {
-    prepared <- own$prepared
-    # What only episodes know that were not drawn keeps its place, with almost no weight.
-    weight <- pmax(count, tiny_weight)[prepared$episode]
     fits <- if (all(count == 1)) {
       own$fit
     } else {
-      policy_fits(design, prepared, weight, own$next_at, own$fit[[1L]])
+      # What only episodes know that were not drawn keeps its place, with almost no weight.
+      prepared <- weigh_steps(own$prepared, pmax(count, tiny_weight)[own$prepared$episode])
+      policy_fits(design, prepared, own$next_at, own$fit[[1L]])
     }
     values <- policy_mean(design$regression$values(fits[[1L]], own$first_block), own$first_p)
-    own$share * stats::weighted.mean(values, count[prepared$episode[own$first]])
+    own$share * stats::weighted.mean(values, count[own$starts])
   }, 0))
 }
 
@@ -117,11 +120,8 @@ cross_fitted <- function(design) {
   taken <- state <- numeric(length(steps$step))
   of_step <- design$fold[steps$episode]
   for (own in sort(unique(design$fold))) {
-    others <- which(of_step != own)
     rows <- which(of_step == own)
-    prepared <- prepare_steps(steps_in(steps, others), design$regression, design$stages)
-    next_at <- function(step) design$act$after(own, step)[others, , drop = FALSE]
-    fits <- policy_fits(design, prepared, rep(1, length(others)), next_at)
+    fits <- fitting_of(design, own, which(of_step != own))$fit
     block <- design$regression$block(steps$state[rows, , drop = FALSE])
     q <- values_by_step(design$regression, fits, block, steps$step[rows], length(steps$actions))
     taken[rows] <- q[cbind(seq_along(rows), steps$action[rows])]
