@@ -43,7 +43,8 @@
 #'   Hasselt 2010).
 #' @return A policy of class `gym_policy_fitted`. [predict()][predict.gym_policy()] takes a data
 #'   frame of states and returns their actions, with `type = "output"` the values of all actions.
-#'   [rollout()] plays it, unless it has a horizon; then `predict()` needs the column `step`, too.
+#'   [rollout()] plays it. With a horizon `predict()` needs the column `step`, too; [rollout()] counts
+#'   the steps of each episode, and after the horizon it goes on as in its last step.
 #'   [state_values()] returns the values of the states of the data. It takes the most frequent
 #'   action where the data does not tell.
 #' @section Errors: `gym_error_argument` for invalid steps, a formula with unknown columns, or a
@@ -127,9 +128,10 @@ new_rule <- function(regression, fits, steps, recipe) {
       regression = regression, fits = fits, recipe = recipe, actions = steps$actions,
       most_taken = which.max(tabulate(steps$action)), keys = episode_keys(steps),
       states = names(steps$state), seen = steps$state, taken = steps$action,
-      step = steps$step, observation_space = NULL, action_space = NULL
+      step = steps$step, observation_space = NULL, action_space = NULL,
+      initial = cbind(step = 1)
     ),
-    class = c("gym_policy_fitted", "gym_policy")
+    class = c("gym_policy_fitted", if (length(fits) > 1L) "gym_policy_memory", "gym_policy")
   )
 }
 
@@ -310,23 +312,28 @@ act.gym_policy_fitted <- function(policy, observation, ...) {
   predict_policy(policy, observation, "action")
 }
 
+# A rule with a horizon counts the steps in its memory. After the last one it goes on as in that.
 #' @exportS3Method
 act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
-  if (length(policy$fits) > 1L) {
-    gym_abort(
-      c("A rule with a horizon depends on the step, so it cannot be played.",
-        i = "`predict()` asks it, with a column `step`; without a horizon a rule plays."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
+  last <- length(policy$fits)
+  choose <- function(observation, step = NULL) {
+    columns <- data.frame(
+      observation_columns(vector_env$observation_space, observation), check.names = FALSE
     )
+    if (!all(policy$states %in% names(columns)) && length(columns) == length(policy$states)) {
+      names(columns) <- policy$states
+    }
+    columns$step <- step
+    actions <- predict_policy(policy, columns, "action", vector_env$call)
+    encoded_values(vector_env$action_space, actions, "action", vector_env$call)
   }
-  columns <- data.frame(
-    observation_columns(vector_env$observation_space, observation), check.names = FALSE
-  )
-  if (!all(policy$states %in% names(columns)) && length(columns) == length(policy$states)) {
-    names(columns) <- policy$states
+  if (last == 1L) {
+    return(choose(observation))
   }
-  actions <- predict_policy(policy, columns, "action", vector_env$call)
-  encoded_values(vector_env$action_space, actions, "action", vector_env$call)
+  policy$act <- function(observation, memory) {
+    list(action = choose(observation, memory[, "step"]), memory = pmin(memory + 1, last))
+  }
+  act_batch.gym_policy_memory(policy, observation, n, vector_env)
 }
 
 #' @export
@@ -366,9 +373,10 @@ rule_lines <- function(x) {
       own <- own[grepl(action, names(own), fixed = TRUE)]
       terms <- gsub(paste0(":?", action, ":?"), "", names(own))
       terms <- ifelse(nzchar(terms), paste0(" x ", gsub("`", "", terms)), "")
+      sum <- paste0(ifelse(own < 0, " - ", " + "), number_text_each(abs(own)), terms, collapse = "")
       paste0(
         if (length(x$fits) > 1L) paste0("Step ", step, ": "), "Takes ", x$actions[[2L]], " if ",
-        paste0(number_text_each(own), terms, collapse = " + "), " > 0"
+        sub("^ - ", "-", sub("^ [+] ", "", sum)), " > 0"
       )
     })))
   }

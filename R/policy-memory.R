@@ -180,7 +180,7 @@ act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
   if (is.null(kept)) {
     gym_abort(
       c("The policy has a memory, so its actions do not depend on the observation alone.",
-        i = "`rollout()` plays it, and `act(policy, observation, memory)` asks it by hand."),
+        i = "`rollout()` plays it, which keeps the memory of each episode."),
       class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
     )
   }

@@ -87,8 +87,25 @@ test_that("a rule plays in the environment of its data", {
   expect_equal(rollout(walk, learn_q(played), episodes = 3, seed = 1)$episodes$return, c(1, 1, 1))
   linear <- learn_fitted_q(played, discount = 0.9)
   expect_equal(rollout(walk, linear, episodes = 3, seed = 1)$episodes$return, c(1, 1, 1))
-  by_step <- learn_fitted_q(played, horizon = 2)
-  expect_error(rollout(walk, by_step, episodes = 1), "depends on the step")
+})
+
+test_that("a rule with a horizon counts the steps of each episode that it plays", {
+  # On the right staying pays 2 and leaving 3, so the last step is the one to leave.
+  walk <- gym_model(data.frame(
+    state = c(1, 1, 2, 2, 3, 3), action = c(0, 1), next_state = c(1, 2, 1, 3, 1, 3),
+    reward = c(1, 0, 1, 0, 3, 2)
+  ), start = 1, max_episode_steps = 4)
+  played <- rollout(walk, policy_random(), episodes = 300, seed = 1, steps = TRUE,
+                    next_observation = TRUE)
+  rule <- learn_fitted_q(played, horizon = 4)
+  expect_equal(rollout(walk, rule, episodes = 5, seed = 1)$episodes$return, rep(5, 5))
+  # With other policies, and beside shorter episodes.
+  both <- rollout(walk, list(rule, policy_random()), episodes = 3, seed = 1, steps = TRUE)$steps
+  own <- both[both$candidate == 1, ]
+  expect_equal(own$action, rep(c(1, 1, 1, 0), 3))
+  short <- learn_fitted_q(played, horizon = 2)
+  expect_equal(rollout(walk, short, episodes = 1, seed = 1)$episodes$return, 4)
+  expect_error(evaluate_policy(walk, rule), "has a memory")
 })
 
 test_that("a rule prints what it does", {
