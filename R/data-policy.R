@@ -108,8 +108,10 @@ known_policy_says <- function(policy, states, actions, call) {
 
 checked_probabilities <- function(said, n, actions, call) {
   labels <- as.character(actions)
-  if (is.null(colnames(said)) && ncol(said) == length(labels)) colnames(said) <- labels
-  good <- is.numeric(said) && nrow(said) == n && !is.null(colnames(said)) &&
+  # `cbind(1 - p, p)` names one column of two.
+  named <- function() length(colnames(said)) && all(nzchar(colnames(said)))
+  if (!named() && ncol(said) == length(labels)) colnames(said) <- labels
+  good <- is.numeric(said) && nrow(said) == n && named() &&
     all(are_probabilities(said)) && all(abs(rowSums(said) - 1) < sum_tolerance)
   if (!good) {
     must <- paste0("return an action for each state, or a matrix of probabilities with ",
@@ -117,7 +119,7 @@ checked_probabilities <- function(said, n, actions, call) {
     gym_abort(paste0("`policy` must ", must, ", not ", describe_argument(said), "."),
               class = "gym_error_argument", argument = "policy", value = said, call = call)
   }
-  check_seen_actions(colSums(said) / n, labels, call)
+  check_seen_actions(colSums(said) / max(n, 1L), labels, call)
   place <- match(labels, colnames(said))
   found <- unname(said[, place, drop = FALSE])
   found[is.na(found)] <- 0

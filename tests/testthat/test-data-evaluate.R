@@ -183,3 +183,48 @@ test_that("estimates print and plot", {
   expect_equal(nrow(as.data.frame(found)), 6L)
   expect_setequal(picture$data[[4]]$x, found$estimates$estimate)
 })
+
+# See tools/offline-fixture.py.
+offline_reference <- function() {
+  jsonlite::read_json(testthat::test_path("offline.json"), simplifyVector = TRUE)
+}
+
+test_that("estimates from clicks are those of obp", {
+  reference <- offline_reference()$open_bandit
+  # A model that predicts what is stored.
+  registerS3method("predict", "stored_rewards", function(object, newdata, ...) {
+    reference$predicted[cbind(as.integer(as.character(newdata$action)), newdata$position) + 1]
+  }, envir = asNamespace("stats"))
+  steps <- steps_data(
+    data.frame(episode = seq_along(reference$action), reference[c("position", "action", "reward")],
+               pscore = reference$pscore),
+    state = "position", probability = "pscore"
+  )
+  expected <- unlist(reference$estimates)
+  found <- evaluate_offline(
+    steps, function(states) t(reference$policy)[states$position + 1, ], names(expected),
+    model = function(formula, data) structure(list(), class = "stored_rewards"), seed = 1,
+    replicates = 2
+  )
+  estimates <- rlang::set_names(found$estimates$estimate, found$estimates$method)
+  expect_equal(estimates[names(expected)], expected, tolerance = 1e-8)
+})
+
+test_that("fitted Q evaluation is that of a loop in NumPy", {
+  reference <- offline_reference()$fitted_q
+  steps <- steps_data(data.frame(
+    episode = (seq_along(reference$x) - 1) %/% reference$length,
+    reference[c("x", "action", "reward")]
+  ))
+  by <- function(horizon) {
+    evaluate_offline(
+      steps, function(states) {
+        up <- pmin(pmax(0.5 + 0.4 * states$x, 0), 1)
+        cbind(1 - up, up)
+      }, "fqe", formula = ~ action * (x + I(x^2)), discount = 0.9, horizon = horizon, seed = 1,
+      replicates = 2
+    )$estimates$estimate
+  }
+  expect_equal(by(NULL), reference$value, tolerance = 1e-6)
+  expect_equal(by(3), reference$value_in_3_steps, tolerance = 1e-6)
+})
