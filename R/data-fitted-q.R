@@ -43,8 +43,8 @@
 #'   Hasselt 2010).
 #' @return A policy of class `gym_policy_fitted`. [predict()][predict.gym_policy()] takes a data
 #'   frame of states and returns their actions, with `type = "output"` the values of all actions.
-#'   [rollout()] plays it. With a horizon `predict()` needs the column `step`, too; [rollout()] counts
-#'   the steps of each episode, and after the horizon it goes on as in its last step.
+#'   [rollout()] plays it. With a horizon `predict()` needs the column `step`, too. [rollout()]
+#'   counts the steps of each episode, and goes on as in the last step after the horizon.
 #'   [state_values()] returns the values of the states of the data. It takes the most frequent
 #'   action where the data does not tell.
 #' @section Errors: `gym_error_argument` for invalid steps, a formula with unknown columns, or a
