@@ -225,8 +225,9 @@ preset_policy <- function(preset, agent) {
 
 inform_of_preset <- function(preset, env) {
   origin <- paste0(preset$origin, if (preset$origin == "paper") paste0(": ", preset$source))
-  cli::cli_inform(
-    c(i = "Taking the preset for {env} ({origin}), see {.code agent_presets(\"{env}\")}."),
+  rlang::inform(
+    c(i = paste0("Taking the preset for ", env, " (", origin, "), see `agent_presets(\"", env,
+                 "\")`.")),
     class = "gym_message_preset"
   )
 }

@@ -173,9 +173,9 @@ close_or_warn <- function(env) {
 #' a default are always there. Play adds `call`, the user's call, which errors name, and `recipe`,
 #' see [environment_recipe()]. Models add `model`, `possible` and `endless`.
 #' @param reset,step `NULL` only with `description`.
-#' @param step_one,guard If there is one sub-environment, and it is in R: a function of one action
-#'   that returns a step without a batch, and one that evaluates many such steps and adds the place
-#'   to their errors.
+#' @param step_one If there is one sub-environment: a function of one action that returns a step.
+#' @param guard If that is in R: a function that evaluates many such steps and adds the place to
+#'   their errors.
 #' @param description What a server needs to play whole episodes itself, see [describe_env()]; it
 #'   then also has `known`, what is known about the environment, and `make_stepped()`, which makes
 #'   the environment that R steps.
@@ -233,15 +233,16 @@ episodes_of_batch <- function(num_envs) {
 single_env <- function(env) {
   observed <- env$observation_space
   actions <- env$action_space
+  step_one <- function(action) {
+    out <- take_step(env, 1L, action)
+    out$observation <- out$next_observation <- batch_of(observed, list(out$observation))
+    out
+  }
   list(
     observation_space = observed, action_space = actions, num_envs = 1L, one_seed = FALSE,
     reset = function(seeds, which = 1L) batch_of(observed, list(first_observation(env, seeds))),
-    step = function(action, which = 1L) {
-      out <- take_step(env, 1L, batch_value(actions, action, 1L))
-      out$observation <- batch_of(observed, list(out$observation))
-      out$next_observation <- out$observation
-      out
-    }
+    step = function(action, which = 1L) step_one(batch_value(actions, action, 1L)),
+    step_one = step_one
   )
 }
 

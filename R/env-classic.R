@@ -231,9 +231,9 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' env_step(client, three, c(0, 1), which = c(1, 3))$observation
 #' env_close(client, three)
 env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
-  check_flag(render)
   instance <- known_instance(x, instance_id)
-  if (render) {
+  if (!isFALSE(render)) {
+    check_flag(render)
     watch_once(instance)
   }
   step_instance(instance, action, which, render)

@@ -83,16 +83,19 @@ gone_codes <- c(
 
 # The client's knowledge of an instance. The server is asked once.
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {
-  check_client(client, "x", call)
-  check_string(instance_id, call = call)
-  instances <- client_state(client)$instances
-  if (is.null(instances[[instance_id]])) {
-    # Not at each call: to ask whether the server runs takes a tenth of a step.
+  instances <- if (inherits(client, "GymClient")) client_state(client)$instances
+  is_name <- is.character(instance_id) && length(instance_id) == 1L && nzchar(instance_id)
+  instance <- if (is_name) instances[[instance_id]]
+  # What is known was checked when it was learned. To ask each time whether the server runs would
+  # take a tenth of a step.
+  if (is.null(instance)) {
+    check_client(client, "x", call)
+    check_string(instance_id, call = call)
     check_not_ended(client, instance_id, call)
     answer <- get_answer(client, instance_route(instance_id), call = call)
-    instances[[instance_id]] <- new_instance(client, instance_id, answer)
+    instance <- instances[[instance_id]] <- new_instance(client, instance_id, answer)
   }
-  instances[[instance_id]]
+  instance
 }
 
 # Calling handlers, such as those of read_values(), do not run after a stack overflow.

@@ -74,9 +74,13 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
   force(action)
   stream <- stream_of(instance)
   message <- if (!is.null(stream$con) && !stream$busy) {
-    request$message %||% keep_message(
-      request, step_message(instance, request, stream, render, named, infos, finals)
-    )
+    if (is.null(request$message)) {
+      keep_message(
+        request, step_message(instance, request, stream, render, named, infos, finals)
+      )
+    } else {
+      request$message
+    }
   }
   result <- if (is.list(message)) {
     content <- message$write(action)

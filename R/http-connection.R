@@ -15,7 +15,6 @@ client_state <- function(client) {
     connection <- new_connection(keys, fetch_with_token_of(client))
     suspendInterrupts({
       state$connection <- connection
-      state$home <- new.env(parent = emptyenv())
       state$session_config <- getOption("httr_config")
       state$instances <- new.env(parent = emptyenv())
       state$creation_keys <- new_idempotency_keys()
@@ -30,7 +29,6 @@ client_state <- function(client) {
     })
   } else if (!identical(state$session_config, getOption("httr_config"))) {
     suspendInterrupts({
-      state$home <- new.env(parent = emptyenv())
       state$connection$handles <- new.env(parent = emptyenv())
       state$connection$inner <- NULL
       state$line <- NULL

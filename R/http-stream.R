@@ -16,11 +16,11 @@ recent_messages <- 1000
 #'   message must go by HTTP.
 #' @noRd
 stream_of <- function(instance) {
-  state <- client_state(instance$client)
   stream <- instance$stream
-  if (is.null(stream) || !identical(stream$home, state$home)) {
+  if (!identical(stream$session, the_session) || stream$pid != Sys.getpid() ||
+        !identical(stream$config, getOption("httr_config"))) {
     if (is_own_stream(stream)) drop_stream(stream)
-    stream <- instance$stream <- new_stream(instance, state)
+    stream <- instance$stream <- new_stream(instance, client_state(instance$client))
   }
   if (is.null(stream$con) && is.null(stream$why_http)) {
     open_stream(stream)
@@ -32,7 +32,7 @@ new_stream <- function(instance, state) {
   stream <- new.env(parent = emptyenv())
   stream$client <- instance$client
   stream$state <- state
-  stream$home <- state$home
+  stream$config <- getOption("httr_config")
   stream$pid <- Sys.getpid()
   stream$session <- the_session
   stream$route <- paste0(instance$route, "stream/")
@@ -214,7 +214,7 @@ is_same_connection <- function(con) {
 ask_stream <- function(stream, message, content, head, call) {
   keys <- stream$keys
   number <- keys$number <- keys$number + 1
-  sent <- c(head, number_bytes(keys, number), content)
+  sent <- c(head, writeBin(number, raw(), endian = "little"), content)
   stream$used <- the_session$messages <- the_session$messages + 1
   stream$busy <- TRUE
   # Such as after an interrupt: what comes then is the answer to another message.
@@ -244,8 +244,7 @@ ask_stream <- function(stream, message, content, head, call) {
 
 # Sends a message and reads so many numbers of the answer, or with `NULL` none. NULL if the
 # connection broke. tryCatch() would take three times as long.
-exchange <- function(con, sent, count) {
-  delayedAssign("broke", return(NULL))
+exchange <- function(con, sent, count, broke = return(NULL)) {
   withCallingHandlers(
     {
       if (!identical(getConnection(con), con)) broke
@@ -260,18 +259,6 @@ exchange <- function(con, sent, count) {
 # The idempotency key of a request by HTTP: of its own, or of a message by a stream that broke.
 stream_key <- function(stream, number = NULL) {
   if (is.null(number)) next_key(stream$keys) else list(key = stream$keys$key, number = number)
-}
-
-# The bytes of a number. Writing many at once takes as long as writing one.
-number_bytes <- function(keys, number) {
-  at <- number - (keys$first_number %||% Inf) + 1
-  if (at < 1 || at > length(keys$bytes)) {
-    keys$first_number <- number
-    bytes <- writeBin(number + 0:255, raw(), endian = "little")
-    keys$bytes <- lapply(seq_len(256L), function(i) bytes[8L * i - 7:0])
-    at <- 1
-  }
-  keys$bytes[[at]]
 }
 
 #' Read the rest of an answer

@@ -55,6 +55,14 @@ sample_stack <- function(space, n) {
 }
 
 stack_values <- function(space, values) {
+  rank <- length(space$shape)
+  if (length(values) == 1L && rank <= 1L && is.numeric(value <- values[[1L]])) {
+    # The usual batch of one, in a fifth of the time.
+    labels <- names(value)
+    value <- as.vector(value)
+    if (rank) value <- matrix(value, 1L, dimnames = if (length(labels)) list(NULL, labels))
+    return(value)
+  }
   flat <- lapply(values, row_major)
   numbers <- if (length(flat)) unlist(flat) else decode_numbers(space$dtype, list())
   stacked <- shape_values(numbers, c(length(values), space$shape))
