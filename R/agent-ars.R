@@ -93,11 +93,11 @@ agent_start.gym_agent_ars <- function(agent, policy) {
 check_can_normalize <- function(agent, policy) {
   if (inherits(policy$observation_space, "gym_space_discrete")) {
     plain <- sub("V2", "V1", agent$version)
-    gym_abort(
-      c(paste0("ARS ", agent$version, " normalizes observations, and those of ", env_text(policy),
-               " are ", format(policy$observation_space), "."),
-        i = paste0("`version = \"", plain, "\"` takes them as they are.")),
-      class = "gym_error_argument", argument = "version", value = agent$version, call = NULL
+    abort_wrong(
+      "version", agent$version, NULL,
+      "ARS {agent$version} normalizes observations, and those of {env_text(policy)} are
+       {format(policy$observation_space)}.",
+      i = '`version = "{plain}"` takes them as they are.'
     )
   }
 }

@@ -19,10 +19,9 @@ replay_bandit <- function(data, method, confidence, seed, call) {
   )
   seen <- length(played$reward)
   if (!seen) {
-    gym_abort(
-      c("The learner never chose the action of the data.",
-        i = "There are too few rows for so many actions, or too unequal probabilities."),
-      class = "gym_error_argument", argument = "env", value = data, call = call
+    abort_wrong(
+      "env", data, call, "The learner never chose the action of the data.",
+      i = "There are too few rows for so many actions, or too unequal probabilities."
     )
   }
   label <- paste0(if (method == "linucb") "LinUCB" else "linear Thompson sampling",

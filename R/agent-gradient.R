@@ -15,19 +15,19 @@ new_gradient_agent <- function(class, settings, log) {
 agent_start.gym_agent_gradient <- function(agent, policy) {
   space <- policy$observation_space
   if (length(space$shape) > 1L) {
-    gym_abort(
-      c(paste0("Agents that follow gradients need observations that are vectors; those of ",
-               env_text(policy), " are of ", format(space), "."),
-        i = if (startsWith(policy$env_id %||% "", "ALE/")) {
-          paste0("`obs_type = \"ram\"` observes the memory, 128 numbers, as in `learn_ppo(\"",
-                 policy$env_id, "\", obs_type = \"ram\", total_steps = 1e6)`.")
-        },
-        if (length(space$shape) == 3L) {
-          c(i = paste("`env <- gym_wrap(gym_wrap(env, \"GrayscaleObservation\"),",
-                      "\"ResizeObservation\", shape = c(32, 32))` makes small grey pictures."))
-        },
-        i = "`gym_wrap(env, \"FlattenObservation\")` makes vectors, with which it can learn."),
-      class = "gym_error_argument", argument = "env", call = NULL
+    abort_wrong(
+      "env", NULL, NULL,
+      "Agents that follow gradients need observations that are vectors; those of
+       {env_text(policy)} are of {format(space)}.",
+      i = if (startsWith(policy$env_id %||% "", "ALE/")) {
+        '`obs_type = "ram"` observes the memory, 128 numbers, as in `learn_ppo("{policy$env_id}",
+         obs_type = "ram", total_steps = 1e6)`.'
+      },
+      i = if (length(space$shape) == 3L) {
+        '`env <- gym_wrap(gym_wrap(env, "GrayscaleObservation"), "ResizeObservation",
+         shape = c(32, 32))` makes small grey pictures.'
+      },
+      i = '`gym_wrap(env, "FlattenObservation")` makes vectors, with which it can learn.'
     )
   }
   agent <- NextMethod()
@@ -175,11 +175,11 @@ check_iteration <- function(batch_steps, min_episodes, call = rlang::caller_env(
 check_has_log_prob <- function(policy, name) {
   if (!has_log_prob(policy)) {
     box <- inherits(policy$action_space, "gym_space_box")
-    gym_abort(
-      c(paste0(name, " needs a policy that draws its actions",
-               if (box) ", with standard deviations", ", not ", format(policy), "."),
-        i = paste0("`output = \"", if (box) "gaussian" else "softmax", "\"` makes it one.")),
-      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    abort_wrong(
+      "policy", policy, NULL,
+      '{name} needs a policy that draws its actions{if (box) ", with standard deviations"}, not
+       {format(policy)}.',
+      i = '`output = "{if (box) "gaussian" else "softmax"}"` makes it one.'
     )
   }
 }
@@ -189,19 +189,19 @@ check_values <- function(policy, name) {
   space <- policy$action_space
   outputs <- policy$sizes[[length(policy$sizes)]]
   if (!inherits(space, "gym_space_discrete")) {
-    gym_abort(
-      c(paste0(name, " learns a value for each action of a Discrete space, but the actions of ",
-               env_text(policy), " are of ", format(space), "."),
-        i = "Use `agent_ppo()` for these actions."),
-      class = "gym_error_argument", argument = "env", call = NULL
+    abort_wrong(
+      "env", NULL, NULL,
+      "{name} learns a value for each action of a Discrete space, but the actions of
+       {env_text(policy)} are of {format(space)}.",
+      i = "Use `agent_ppo()` for these actions."
     )
   }
   if (!identical(policy$output, "epsilon-greedy") || outputs != space$n) {
-    gym_abort(
-      c(paste0(name, " needs a network with a value for each of ", count_of(space$n, "action"),
-               " and the output \"epsilon-greedy\", not ", format(policy), "."),
-        i = "`policy_network(c(NA, 64, 64, NA), output = \"epsilon-greedy\")` is one."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    abort_wrong(
+      "policy", policy, NULL,
+      '{name} needs a network with a value for each of {count_of(space$n, "action")} and the
+       output "epsilon-greedy", not {format(policy)}.',
+      i = '`policy_network(c(NA, 64, 64, NA), output = "epsilon-greedy")` is one.'
     )
   }
 }

@@ -66,10 +66,9 @@ check_importance <- function(importance, target_policy, temperature, exploring_s
                              learning_rate, call = rlang::caller_env()) {
   if (importance == "none") {
     if (!is.null(target_policy)) {
-      gym_abort(
-        "`target_policy` needs `importance`, because another policy plays the episodes.",
-        class = "gym_error_argument", argument = "target_policy", value = target_policy,
-        call = call
+      abort_wrong(
+        "target_policy", target_policy, call,
+        "`target_policy` needs `importance`, because another policy plays the episodes."
       )
     }
     return()
@@ -79,10 +78,10 @@ check_importance <- function(importance, target_policy, temperature, exploring_s
     abort_argument(target_policy, must, "target_policy", call)
   }
   if (!is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)) {
-    gym_abort(
-      paste("`importance` works with `epsilon` only: leave out `temperature`,",
-            "`exploring_starts` and `learning_rate`."),
-      class = "gym_error_argument", argument = "importance", value = importance, call = call
+    abort_wrong(
+      "importance", importance, call,
+      "`importance` works with `epsilon` only: leave out `temperature`, `exploring_starts` and
+       `learning_rate`."
     )
   }
 }

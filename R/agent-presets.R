@@ -151,7 +151,7 @@ make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::cal
   }
   check_spelling(names(kwargs), c(of_agent, of_training), budget || !is.null(preset), frame)
   if (is.null(preset) && !budget) {
-    abort_no_budget(preset_hints(env, kwargs), frame)
+    abort_no_budget(names(kwargs), NULL, other_presets_text(env), frame)
   }
   training <- preset_training(preset, training, budget)
   if (!is.null(preset) && !goes_on) {
@@ -191,17 +191,14 @@ with_preset <- function(agent, preset, given) {
   agent
 }
 
-preset_hints <- function(env, kwargs) {
+# Those of the environment, if the user's arguments fit none of them.
+other_presets_text <- function(env) {
   presets <- if (is.character(env)) own_presets(env)
-  known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
-                  presets$kwargs, collapse = ", ")
-  c(
-    i = if (NROW(presets)) {
-      paste0("There are presets of ", env, " for other arguments or another agent: ",
-             known, ".")
-    },
-    unknown_arguments_hint(names(kwargs), NULL)
-  )
+  if (NROW(presets)) {
+    known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
+                    presets$kwargs, collapse = ", ")
+    paste0("There are presets of ", env, " for other arguments or another agent: ", known, ".")
+  }
 }
 
 preset_policy <- function(preset, agent) {

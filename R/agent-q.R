@@ -77,15 +77,15 @@ agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tempera
   settings$planning <- as.integer(planning)
   check_learner(settings)
   if (bonus > 0 && planning == 0) {
-    gym_abort(
-      "`bonus` is added to the rewards of planning: give `planning`, too.",
-      class = "gym_error_argument", argument = "bonus", value = bonus
+    abort_wrong(
+      "bonus", bonus, rlang::current_env(),
+      "`bonus` is added to the rewards of planning: give `planning`, too."
     )
   }
   if (planning > 0 && (double || !is.null(features))) {
-    gym_abort(
-      "`planning` is for a single table, not for features or double Q-learning.",
-      class = "gym_error_argument", argument = "planning", value = planning
+    abort_wrong(
+      "planning", planning, rlang::current_env(),
+      "`planning` is for a single table, not for features or double Q-learning."
     )
   }
   new_learner("gym_agent_q", settings)
@@ -263,10 +263,9 @@ learn_q <- function(env, ...) {
 learn_q_from_data <- function(data, given, call) {
   unfit <- setdiff(rlang::names2(given), c("discount", "double", "iterations"))
   if (length(unfit)) {
-    gym_abort(
-      c(paste0("From data `learn_q()` has no argument `", unfit[[1L]], "`."),
-        i = "It has `discount`, `double` and `iterations`."),
-      class = "gym_error_argument", argument = unfit[[1L]], call = call
+    abort_wrong(
+      unfit[[1L]], NULL, call, "From data `learn_q()` has no argument `{unfit[[1L]]}`.",
+      i = "It has `discount`, `double` and `iterations`."
     )
   }
   discount <- given[["discount"]] %||% 0.99

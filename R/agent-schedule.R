@@ -72,10 +72,10 @@ check_schedule <- function(x, arg, min, max, call, above_zero = FALSE) {
 check_explores <- function(epsilon, call) {
   is_zero <- function(taken) isTRUE(tryCatch(epsilon(taken) == 0, error = function(cnd) FALSE))
   if (is.function(epsilon) && all(vapply(c(0, 10^(0:8)), is_zero, NA))) {
-    gym_abort(
-      c("`epsilon` is a schedule that is 0 from the first step, so the agent never explores.",
-        i = "Start above 0, as in `schedule_linear(1, 0.1, duration = 10000)`, or give 0."),
-      class = "gym_error_argument", argument = "epsilon", value = epsilon, call = call
+    abort_wrong(
+      "epsilon", epsilon, call,
+      "`epsilon` is a schedule that is 0 from the first step, so the agent never explores.",
+      i = "Start above 0, as in `schedule_linear(1, 0.1, duration = 10000)`, or give 0."
     )
   }
 }
@@ -86,10 +86,10 @@ scheduled <- function(x, taken, arg, min = 0, max = 1) {
   }
   value <- x(taken)
   if (!is_number(value) || value < min || value > max) {
-    gym_abort(
-      paste0("The function `", arg, "` must return a number", range_text(min, max), ", and after ",
-             number_text(taken), " steps it returned ", describe_argument(value), "."),
-      class = "gym_error_argument", argument = arg, value = value, call = NULL
+    abort_wrong(
+      arg, value, NULL,
+      "The function `{arg}` must return a number{range_text(min, max)}, and after
+       {number_text(taken)} steps it returned {describe_argument(value)}."
     )
   }
   value

@@ -116,10 +116,10 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
     abort_argument(agent, must, "agent", call)
   }
   if ("env" %in% names(formals(agent))) {
-    gym_abort(
-      c("`agent` must be the function that makes the agent, not one that trains it.",
-        i = "Give `agent_ars` instead of `search_ars`, `agent_ppo` instead of `learn_ppo`."),
-      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    abort_wrong(
+      "agent", agent, call,
+      "`agent` must be the function that makes the agent, not one that trains it.",
+      i = "Give `agent_ars` instead of `search_ars`, `agent_ppo` instead of `learn_ppo`."
     )
   }
   check_given(settings, "`expand.grid(step_size = c(0.02, 0.1))` has a row for each.", call = call)
@@ -134,10 +134,10 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
     check_seeds(report_seeds, call)
     both <- intersect(seeds, report_seeds)
     if (length(both)) {
-      gym_abort(
-        c(paste0("Seed ", both[[1L]], " is one of `seeds` and of `report_seeds`."),
-          i = "What is reported must come from seeds that chose nothing."),
-        class = "gym_error_argument", argument = "report_seeds", value = report_seeds, call = call
+      abort_wrong(
+        "report_seeds", report_seeds, call,
+        "Seed {both[[1L]]} is one of `seeds` and of `report_seeds`.",
+        i = "What is reported must come from seeds that chose nothing."
       )
     }
   }
@@ -146,11 +146,11 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
 check_settings <- function(names, known, call) {
   unknown <- setdiff(names, known)
   if (length(unknown) && !"..." %in% known) {
-    gym_abort(
-      c(paste0("The agent has no argument `", unknown[[1L]], "`, a column of `settings`."),
-        i = did_you_mean(unknown[[1L]], known),
-        i = paste0("It has ", quoted_names(known), ".")),
-      class = "gym_error_argument", argument = "settings", value = unknown, call = call
+    abort_wrong(
+      "settings", unknown, call,
+      "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
+      i = "{did_you_mean(unknown[[1L]], known)}",
+      i = "It has {quoted_names(known)}."
     )
   }
 }

@@ -58,9 +58,8 @@ check_behavior <- function(policy, behavior, n, lambda, call = rlang::caller_env
     }
   }
   if (n > 1 || lambda > 0) {
-    gym_abort(
-      "`behavior` is for one step: leave out `n` and `lambda`.",
-      class = "gym_error_argument", argument = "behavior", value = behavior, call = call
+    abort_wrong(
+      "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
     )
   }
 }

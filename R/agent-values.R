@@ -32,10 +32,7 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
   check_string(settings$mask, arg = "mask", allow_null = TRUE, call = call)
   if (!is.null(settings$mask) && !is.null(features)) {
-    gym_abort(
-      "`mask` works with a table only, not with features.",
-      class = "gym_error_argument", argument = "mask", value = settings$mask, call = call
-    )
+    abort_wrong("mask", settings$mask, call, "`mask` works with a table only, not with features.")
   }
 }
 
@@ -55,11 +52,10 @@ check_initial <- function(settings, call) {
 agent_start.gym_value_learner <- function(agent, policy) {
   call <- NULL
   if (!inherits(policy$action_space, "gym_space_discrete")) {
-    gym_abort(
-      c(paste0("A learner of values needs Discrete actions, not ",
-               format(policy$action_space), "."),
-        i = "`search_ars()` and `search_cem()` learn actions of a Box."),
-      class = "gym_error_argument", argument = "env", call = call
+    abort_wrong(
+      "env", NULL, call,
+      "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
+      i = "`search_ars()` and `search_cem()` learn actions of a Box."
     )
   }
   agent$spaces <- policy[c("observation_space", "action_space")]
@@ -102,9 +98,9 @@ first_weights <- function(agent, policy) {
 
 check_first_table <- function(agent, policy) {
   if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
-    gym_abort(
-      "Only a learner of a table with a column for each action can start with a table.",
-      class = "gym_error_argument", argument = "policy", value = policy, call = NULL
+    abort_wrong(
+      "policy", policy, NULL,
+      "Only a learner of a table with a column for each action can start with a table."
     )
   }
 }
@@ -195,10 +191,9 @@ feature_store <- function(weights, initial, columns) {
       check_first_weights(initial, length(x))
       weights <<- matrix(as.double(initial), length(x), columns)
     } else if (length(x) != nrow(weights)) {
-      gym_abort(
-        paste0("`features` returned ", count_of(nrow(weights), "feature"), " at first, and now ",
-               length(x), "."),
-        class = "gym_error_argument", argument = "features", call = NULL
+      abort_wrong(
+        "features", NULL, NULL,
+        '`features` returned {count_of(nrow(weights), "feature")} at first, and now {length(x)}.'
       )
     }
   }

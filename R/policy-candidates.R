@@ -34,20 +34,20 @@ policy_candidates <- function(policy, weights) {
 check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {
   if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights)) {
     single <- is.numeric(weights) && is.null(dim(weights))
-    gym_abort(
-      c(paste0("`weights` must be a numeric matrix with a candidate in each row, not ",
-               describe_argument(weights), "."),
-        i = if (single) "For a single candidate this is `rbind(weights)`."),
-      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    abort_wrong(
+      "weights", weights, call,
+      "`weights` must be a numeric matrix with a candidate in each row, not
+       {describe_argument(weights)}.",
+      i = if (single) "For a single candidate this is `rbind(weights)`."
     )
   }
   if (ncol(weights) != count) {
     turned <- nrow(weights) == count
-    gym_abort(
-      c(paste0("`weights` must have the ", count_of(count, "weight"), " of a candidate in each ",
-               "row, one a column, not ", count_of(ncol(weights), "column"), "."),
-        i = if (turned) "`t(weights)` has a candidate in each row."),
-      class = "gym_error_argument", argument = "weights", value = weights, call = call
+    abort_wrong(
+      "weights", weights, call,
+      '`weights` must have the {count_of(count, "weight")} of a candidate in each row, one a
+       column, not {count_of(ncol(weights), "column")}.',
+      i = if (turned) "`t(weights)` has a candidate in each row."
     )
   }
   if (anyNA(weights)) {

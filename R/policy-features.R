@@ -89,11 +89,11 @@ check_features <- function(values, n, call) {
   values <- plain_numbers(values, "features", call)
   if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) || nrow(values) != n ||
         !all(is.finite(values))) {
-    gym_abort(
-      c(paste0("`features` must return a numeric matrix with a row for each of ",
-               count_of(n, "observation"), ", not ", describe_argument(values), "."),
-        i = "It gets many observations at once, as a policy does; see `act()`."),
-      class = "gym_error_argument", argument = "features", value = values, call = call
+    abort_wrong(
+      "features", values, call,
+      '`features` must return a numeric matrix with a row for each of
+       {count_of(n, "observation")}, not {describe_argument(values)}.',
+      i = "It gets many observations at once, as a policy does; see `act()`."
     )
   }
   values
@@ -112,11 +112,11 @@ tiles_of <- function(features, space, call) {
   high <- rep_len(features$high %||% range$high, numbers)
   unbounded <- !is.finite(low) | !is.finite(high) | low >= high
   if (any(unbounded)) {
-    gym_abort(
-      c(paste0("Number ", which(unbounded)[[1L]], " of an observation has no range: its bounds ",
-               "are ", low[unbounded][[1L]], " and ", high[unbounded][[1L]], "."),
-        i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."),
-      class = "gym_error_argument", argument = "features", value = features, call = call
+    abort_wrong(
+      "features", features, call,
+      "Number {which(unbounded)[[1L]]} of an observation has no range: its bounds are
+       {low[unbounded][[1L]]} and {high[unbounded][[1L]]}.",
+      i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."
     )
   }
   bins <- rep_len(features$bins, numbers)
@@ -125,12 +125,11 @@ tiles_of <- function(features, space, call) {
   weights <- c(1, cumprod(bins + 1))
   per_tiling <- weights[[numbers + 1L]]
   if (per_tiling * tilings > most_values) {
-    gym_abort(
-      c(paste0("The tilings would have ", whole_number_text(per_tiling * tilings),
-               " tiles; at most ", whole_number_text(most_values),
-               " are possible."),
-        i = "Take fewer `bins`, or features of your own, of fewer numbers."),
-      class = "gym_error_argument", argument = "features", value = features, call = call
+    abort_wrong(
+      "features", features, call,
+      "The tilings would have {whole_number_text(per_tiling * tilings)} tiles; at most
+       {whole_number_text(most_values)} are possible.",
+      i = "Take fewer `bins`, or features of your own, of fewer numbers."
     )
   }
   width <- (high - low) / bins
@@ -173,10 +172,10 @@ tiled_range <- function(space, features, call) {
     return(list(low = as.double(space$start), high = as.double(space$start) + as.double(space$n)))
   }
   if (!inherits(space, "gym_space_box") || length(space$shape) != 1L) {
-    gym_abort(
-      paste0("Tiles are for observations that are Discrete or a Box of one dimension, not ",
-             format(space), "."),
-      class = "gym_error_argument", argument = "features", value = features, call = call
+    abort_wrong(
+      "features", features, call,
+      "Tiles are for observations that are Discrete or a Box of one dimension, not
+       {format(space)}."
     )
   }
   list(low = as.numeric(space$low), high = as.numeric(space$high))

@@ -4,12 +4,9 @@ check_takes_observations <- function(policy, arg, call) {
   # args() is NULL for the few primitives that take any arguments.
   declared <- args(policy)
   if (!is.null(declared) && !length(formals(declared))) {
-    gym_abort(
-      c(
-        paste0("`", arg, "` must be a function of observations; this one has no argument."),
-        i = "An example: `function(observation) as.integer(observation[, 3] > 0)`."
-      ),
-      class = "gym_error_argument", argument = arg, value = policy, call = call
+    abort_wrong(
+      arg, policy, call, "`{arg}` must be a function of observations; this one has no argument.",
+      i = "An example: `function(observation) as.integer(observation[, 3] > 0)`."
     )
   }
 }
@@ -76,17 +73,13 @@ batch_actions <- function(actions, n, vector_env) {
 
 abort_action_count <- function(actions, count, n, vector_env) {
   returned <- if (is.na(count)) describe_argument(actions) else count_of(count, "action")
-  gym_abort(
-    c(
-      paste0(
-        "The policy must give one action for ",
-        if (n == 1L) "the one observation" else paste("each of", n, "observations"),
-        ", not ", returned, "."
-      ),
-      i = observations_hint(vector_env$observation_space),
-      i = actions_hint(vector_env$action_space)
-    ),
-    class = "gym_error_argument", argument = "policy", value = actions, call = vector_env$call
+  abort_wrong(
+    "policy", actions, vector_env$call,
+    'The policy must give one action for
+     {if (n == 1L) "the one observation" else paste("each of", n, "observations")}, not
+     {returned}.',
+    i = "{observations_hint(vector_env$observation_space)}",
+    i = "{actions_hint(vector_env$action_space)}"
   )
 }
 

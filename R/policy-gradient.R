@@ -193,11 +193,11 @@ check_is_network <- function(policy, call = rlang::caller_env()) {
 check_draws_known <- function(policy, call = rlang::caller_env()) {
   check_is_network(policy, call)
   if (!has_log_prob(policy)) {
-    gym_abort(
-      c(paste0("Only a network that draws its actions knows their probabilities, not ",
-               policy_text(policy), "."),
-        i = "`policy_network()` with `output = \"softmax\"` or `\"gaussian\"` makes one."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "Only a network that draws its actions knows their probabilities, not
+       {policy_text(policy)}.",
+      i = '`policy_network()` with `output = "softmax"` or `"gaussian"` makes one.'
     )
   }
 }

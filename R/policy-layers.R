@@ -115,12 +115,10 @@ layer_activations <- function(activation, sizes, call = rlang::caller_env()) {
   }
   layers <- length(sizes) - 1L
   if (length(activation) != layers && length(activation) != 2L) {
-    gym_abort(
-      paste0(
-        "`activation` must have 2 names (hidden layers, outputs) or one for each of the ",
-        layers, " layers after the inputs, not ", length(activation), "."
-      ),
-      class = "gym_error_argument", argument = "activation", value = activation, call = call
+    abort_wrong(
+      "activation", activation, call,
+      "`activation` must have 2 names (hidden layers, outputs) or one for each of the {layers}
+       layers after the inputs, not {length(activation)}."
     )
   }
   if (length(activation) != layers) {

@@ -62,10 +62,10 @@ check_takes_memory <- function(act, call) {
   }
   takes <- names(formals(args(act)))
   if (!"..." %in% takes && length(takes) < 2L) {
-    gym_abort(
-      paste0("`act` must be ", must, ", not of ",
-             if (length(takes)) paste0("`", takes, "` alone") else "nothing", "."),
-      class = "gym_error_argument", argument = "act", value = act, call = call
+    abort_wrong(
+      "act", act, call,
+      '`act` must be {must}, not of
+       {if (length(takes)) paste0("`", takes, "` alone") else "nothing"}.'
     )
   }
 }
@@ -134,11 +134,11 @@ size_text <- function(memory) {
 }
 
 abort_memory <- function(value, must, call) {
-  gym_abort(
-    c(paste0("`act` of a policy with a memory must return ", must, ", not ",
-             if (length(dim(value)) == 2L) size_text(value) else describe_argument(value), "."),
-      i = "An example: `list(action = as.integer(push > 0), memory = cbind(error, sum))`."),
-    class = "gym_error_argument", argument = "policy", value = value, call = call
+  abort_wrong(
+    "policy", value, call,
+    "`act` of a policy with a memory must return {must}, not
+     {if (length(dim(value)) == 2L) size_text(value) else describe_argument(value)}.",
+    i = "An example: `list(action = as.integer(push > 0), memory = cbind(error, sum))`."
   )
 }
 
@@ -178,10 +178,10 @@ policy_rows.gym_policy_memory <- function(policy, candidate, sub_env) {
 act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
   kept <- policy$kept
   if (is.null(kept)) {
-    gym_abort(
-      c("The policy has a memory, so its actions do not depend on the observation alone.",
-        i = "`rollout()` plays it, which keeps the memory of each episode."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = vector_env$call
+    abort_wrong(
+      "policy", policy, vector_env$call,
+      "The policy has a memory, so its actions do not depend on the observation alone.",
+      i = "`rollout()` plays it, which keeps the memory of each episode."
     )
   }
   rows <- policy$sub_env

@@ -148,26 +148,23 @@ binomial_levels <- function(model, call) {
     levels(stats::model.frame(model)[[1L]])
   }
   if (length(labels) > 2L) {
-    gym_abort(
-      c(paste0("A binomial model tells two actions apart, but its response has ", length(labels),
-               " levels."),
-        i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."),
-      class = "gym_error_argument", argument = "x", value = model, call = call
+    abort_wrong(
+      "x", model, call,
+      "A binomial model tells two actions apart, but its response has {length(labels)} levels.",
+      i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."
     )
   }
   labels
 }
 
 abort_no_model <- function(x, call) {
-  gym_abort(
-    c(
-      paste0("`x` must be a policy, a function of observations or a model of `lm()`, `glm()`, ",
-             "`rpart::rpart()` or `nnet::nnet()`, not ", describe_argument(x), "."),
-      i = if (is.object(x)) {
-        "For another model, give `predict = function(model, newdata) ...`, which returns actions."
-      }
-    ),
-    class = "gym_error_argument", argument = "x", value = x, call = call
+  abort_wrong(
+    "x", x, call,
+    "`x` must be a policy, a function of observations or a model of `lm()`, `glm()`,
+     `rpart::rpart()` or `nnet::nnet()`, not {describe_argument(x)}.",
+    i = if (is.object(x)) {
+      "For another model, give `predict = function(model, newdata) ...`, which returns actions."
+    }
   )
 }
 
@@ -188,11 +185,11 @@ format.gym_policy_model <- function(x, ...) {
 policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()) {
   actions <- env$action_space
   if (!inherits(actions, c("gym_space_discrete", "gym_space_box"))) {
-    gym_abort(
-      c(paste0("A model cannot choose from ", format(actions), " of ", environment_label(env), "."),
-        i = paste("It can predict discrete actions and those of a Box; a function of observations",
-                  "can put several predictions together.")),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "A model cannot choose from {format(actions)} of {environment_label(env)}.",
+      i = "It can predict discrete actions and those of a Box; a function of observations can put
+           several predictions together."
     )
   }
   load_model_package(policy, call)
@@ -269,10 +266,10 @@ takes_table <- function(policy) {
 
 check_was_played <- function(policy, call) {
   if (is.null(policy$action_space)) {
-    gym_abort(
-      c("The model does not know the observations and actions of an environment.",
-        i = "Play it with `rollout()`: the policy in what that returns knows the environment."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "The model does not know the observations and actions of an environment.",
+      i = "Play it with `rollout()`: the policy in what that returns knows the environment."
     )
   }
 }

@@ -60,11 +60,11 @@ check_inputs <- function(policy, env, call) {
     abort_fit(policy, paste("A network cannot observe", format(space)), env, call)
   }
   if (!is.null(policy$moments) && inherits(space, "gym_space_discrete")) {
-    gym_abort(
-      c(paste0("Observations that are numbers of a range can be normalized, but those of ",
-               environment_label(env), " are ", format(space), "."),
-        i = "Make the policy with `normalize = FALSE`."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "Observations that are numbers of a range can be normalized, but those of
+       {environment_label(env)} are {format(space)}.",
+      i = "Make the policy with `normalize = FALSE`."
     )
   }
   if (gives != inputs) {
@@ -114,13 +114,13 @@ check_output_fits <- function(policy, env, call) {
   )
   if (!fits) {
     needs <- if (is_gaussian(policy)) "a Box of real numbers" else "a Discrete action space"
-    gym_abort(
-      c(paste0("The output \"", policy$output, "\" needs ", needs, ", but ",
-               environment_label(env), " takes actions of ", format(space), "."),
-        i = if (!discrete) {
-          "`output = \"gaussian\"` draws numbers, and `agent_ppo()` trains such a network."
-        }),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      'The output "{policy$output}" needs {needs}, but {environment_label(env)} takes actions of
+       {format(space)}.',
+      i = if (!discrete) {
+        '`output = "gaussian"` draws numbers, and `agent_ppo()` trains such a network.'
+      }
     )
   }
 }
@@ -128,24 +128,19 @@ check_output_fits <- function(policy, env, call) {
 check_bounded <- function(policy, env, call) {
   space <- env$action_space
   if (!all(is.finite(c(space$low, space$high)))) {
-    gym_abort(
-      c(
-        paste0(
-          "The outputs of \"", output_activation(policy), "\" are scaled to the bounds of the ",
-          "action, but ", environment_label(env), " takes ", format(space),
-          " with a side without a bound."
-        ),
-        i = "Outputs of \"identity\" are taken as they are."
-      ),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
+       {environment_label(env)} takes {format(space)} with a side without a bound.',
+      i = 'Outputs of "identity" are taken as they are.'
     )
   }
 }
 
 abort_fit <- function(policy, problem, env, call) {
-  gym_abort(
-    c(paste0(problem, "."), i = fitting_sizes(policy, env)),
-    class = "gym_error_argument", argument = "policy", value = policy, call = call
+  abort_wrong(
+    "policy", policy, call, "{problem}.",
+    i = "{fitting_sizes(policy, env)}"
   )
 }
 

@@ -160,10 +160,10 @@ new_network <- function(sizes, activation, bias, normalize) {
 
 check_weights_fit <- function(weights, policy, call = rlang::caller_env()) {
   if (anyNA(policy$sizes)) {
-    gym_abort(
-      c("`weights` are for given sizes, and `sizes` leaves some to the environment.",
-        i = "Give all sizes as numbers."),
-      class = "gym_error_argument", argument = "sizes", value = policy$sizes, call = call
+    abort_wrong(
+      "sizes", policy$sizes, call,
+      "`weights` are for given sizes, and `sizes` leaves some to the environment.",
+      i = "Give all sizes as numbers."
     )
   }
   check_weights(weights, policy$sizes, policy$bias, call = call)
@@ -179,11 +179,10 @@ check_output <- function(output, call = rlang::caller_env()) {
 check_draws_from_sums <- function(output, activation, call = rlang::caller_env()) {
   last <- activation[[length(activation)]]
   if (!identical(output, "greedy") && last != "identity") {
-    gym_abort(
-      c(paste0("A network that draws its actions needs outputs of \"identity\", not of \"", last,
-               "\"."),
-        i = "`activation = c(\"tanh\", \"identity\")` has them."),
-      class = "gym_error_argument", argument = "activation", value = activation, call = call
+    abort_wrong(
+      "activation", activation, call,
+      'A network that draws its actions needs outputs of "identity", not of "{last}".',
+      i = '`activation = c("tanh", "identity")` has them.'
     )
   }
 }
@@ -312,10 +311,9 @@ abort_observation <- function(policy, values, call) {
   } else {
     paste("is of type", typeof(values))
   }
-  gym_abort(
-    paste0("The network takes ", count_of(policy$sizes[[1L]], "input"),
-           ", but the observation ", given, "."),
-    class = "gym_error_argument", argument = "observation", value = values, call = call
+  abort_wrong(
+    "observation", values, call,
+    'The network takes {count_of(policy$sizes[[1L]], "input")}, but the observation {given}.'
   )
 }
 

@@ -138,13 +138,13 @@ places_by_name <- function(given, known, own, open, arg, call) {
   absent <- setdiff(known, given)
   strange <- if (!open) c(setdiff(given, known), given[duplicated(given)])
   if (length(absent) || length(strange)) {
-    gym_abort(
-      c(paste0("`", arg, "` must have the names of the observations",
-               if (length(absent)) paste0("; it has no ", quoted_names(absent)),
-               if (length(strange)) paste0("; it has ", quoted_names(unique(strange))), "."),
-        i = paste0("Their names are ", few_names(known), "."),
-        i = if (!open) "Without names, numbers are taken by position: `unname()` removes them."),
-      class = "gym_error_argument", argument = arg, value = given, call = call
+    abort_wrong(
+      arg, given, call,
+      '`{arg}` must have the names of the observations{
+       if (length(absent)) paste0("; it has no ", quoted_names(absent))}{
+       if (length(strange)) paste0("; it has ", quoted_names(unique(strange)))}.',
+      i = "Their names are {few_names(known)}.",
+      i = if (!open) "Without names, numbers are taken by position: `unname()` removes them."
     )
   }
   match(known, given)

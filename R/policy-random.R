@@ -44,14 +44,9 @@ random_discrete_agent <- function(n) {
 act.gym_policy_random <- function(policy, observation, ...) {
   space <- policy$action_space
   if (is.null(space)) {
-    gym_abort(
-      c(
-        "The random policy has no action space.",
-        i = "Give one, as in `policy_random(env$action_space)`, or play it with `rollout()`."
-      ),
-      class = "gym_error_argument",
-      argument = "policy",
-      value = policy
+    abort_wrong(
+      "policy", policy, rlang::current_env(), "The random policy has no action space.",
+      i = "Give one, as in `policy_random(env$action_space)`, or play it with `rollout()`."
     )
   }
   n <- count_observed(observation, policy$observation_space)
@@ -89,15 +84,10 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
     count <- if (!is.null(env$possible)) rowSums(env$possible)
     policy$possible <- if (any(count > 0 & count < ncol(env$possible))) env$possible
   } else if (!space_within(own, env$action_space)) {
-    gym_abort(
-      paste0(
-        "The policy's actions are ", format(own), ", but ", environment_label(env),
-        " takes ", format(env$action_space), "."
-      ),
-      class = "gym_error_argument",
-      argument = "policy",
-      value = policy,
-      call = call
+    abort_wrong(
+      "policy", policy, call,
+      "The policy's actions are {format(own)}, but {environment_label(env)} takes
+       {format(env$action_space)}."
     )
   }
   policy

@@ -49,11 +49,11 @@ check_in_order <- function(q, call = rlang::caller_env()) {
     names <- dimnames(q)[[axis]]
     if (isTRUE(is.unsorted(suppressWarnings(as.numeric(names))))) {
       sorted <- c("q[order(as.numeric(rownames(q))), ]", "q[, order(as.numeric(colnames(q)))]")
-      gym_abort(
-        c(paste0("The ", c("rows", "columns")[[axis]], " of `q` must be in the order of their ",
-                 "numbers, not ", few_names(names), "."),
-          i = paste0("`", sorted[[axis]], "` is.")),
-        class = "gym_error_argument", argument = "q", value = q, call = call
+      abort_wrong(
+        "q", q, call,
+        'The {c("rows", "columns")[[axis]]} of `q` must be in the order of their numbers, not
+         {few_names(names)}.',
+        i = "`{sorted[[axis]]}` is."
       )
     }
   }
@@ -99,10 +99,10 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   number <- rows_of_table(space_index(space), space, observation, n, call)
   rows <- policy$q[number, , drop = FALSE]
   if (any(rows[, 1L] == -Inf) && any(row_max(rows) == -Inf)) {
-    gym_abort(
-      paste0("Row ", number[row_max(rows) == -Inf][[1L]],
-             " of the policy's table leaves no action: all its values are -Inf."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "Row {number[row_max(rows) == -Inf][[1L]]} of the policy's table leaves no action: all its
+       values are -Inf."
     )
   }
   rows
@@ -169,10 +169,7 @@ policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()
 }
 
 abort_table <- function(policy, problem, call) {
-  gym_abort(
-    paste0(problem, "."), class = "gym_error_argument", argument = "policy", value = policy,
-    call = call
-  )
+  abort_wrong("policy", policy, call, "{problem}.")
 }
 
 #' @export

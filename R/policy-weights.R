@@ -43,10 +43,9 @@ draw_first_weights <- function(policy) {
 # weights before it is bound.
 check_network <- function(policy, call = rlang::caller_env()) {
   if (is.null(policy$weights)) {
-    gym_abort(
-      c(paste0("The network does not know its sizes: ", sizes_text(policy$sizes), "."),
-        i = "`policy_bind(policy, env)` takes them from the environment."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call, "The network does not know its sizes: {sizes_text(policy$sizes)}.",
+      i = "`policy_bind(policy, env)` takes them from the environment."
     )
   }
   check_weights(policy$weights, policy$sizes, policy$bias, "policy$weights", call)
@@ -71,14 +70,11 @@ check_layer <- function(layer, wanted, bias, arg, call) {
   }
   if (!identical(dim(layer), as.integer(wanted))) {
     turned <- identical(rev(dim(layer)), as.integer(wanted))
-    gym_abort(
-      c(
-        paste0("`", arg, "` must be a matrix of ", paste(wanted, collapse = " x "),
-               " for these sizes", if (isTRUE(bias)) " and a bias", ", not of ",
-               paste(dim(layer), collapse = " x "), "."),
-        i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
-      ),
-      class = "gym_error_argument", argument = arg, value = layer, call = call
+    abort_wrong(
+      arg, layer, call,
+      '`{arg}` must be a matrix of {paste(wanted, collapse = " x ")} for these
+       sizes{if (isTRUE(bias)) " and a bias"}, not of {paste(dim(layer), collapse = " x ")}.',
+      i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
     )
   }
   if (anyNA(layer)) {
@@ -191,14 +187,9 @@ table_hint <- paste(
 )
 
 abort_no_weights <- function(policy, arg, call) {
-  gym_abort(
-    c(paste0("`", arg, "` must be a policy with weights, not ", policy_text(policy), "."),
-      i = if (inherits(policy, "gym_policy_table")) {
-        table_hint
-      } else {
-        "`policy_network()` makes one."
-      }),
-    class = "gym_error_argument", argument = arg, value = policy, call = call
+  abort_wrong(
+    arg, policy, call, "`{arg}` must be a policy with weights, not {policy_text(policy)}.",
+    i = if (inherits(policy, "gym_policy_table")) table_hint else "`policy_network()` makes one."
   )
 }
 

@@ -125,10 +125,9 @@ print.gym_policy <- function(x, ...) {
 
 check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (identical(x, policy_random) || identical(x, policy_network)) {
-    gym_abort(
-      c(paste0("`", arg, "` must be a policy, not the function that makes one."),
-        i = "Did you forget the parentheses, as in `policy_random()`?"),
-      class = "gym_error_argument", argument = arg, value = x, call = call
+    abort_wrong(
+      arg, x, call, "`{arg}` must be a policy, not the function that makes one.",
+      i = "Did you forget the parentheses, as in `policy_random()`?"
     )
   }
   if (!inherits(x, "gym_policy") && !is.function(x) && !has_method(x, "act")) {
@@ -173,28 +172,23 @@ trained_policy <- function(x) {
 # Candidates are several policies, so they cannot be an element of a list.
 check_one_policy <- function(x, arg, call) {
   if (!is.null(count_candidates(x))) {
-    gym_abort(
-      c(paste0("`", arg, "` must be one policy, not ", policy_text(x), "."),
-        i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."),
-      class = "gym_error_argument", argument = arg, value = x, call = call
+    abort_wrong(
+      arg, x, call, "`{arg}` must be one policy, not {policy_text(x)}.",
+      i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."
     )
   }
 }
 
 abort_no_policy <- function(x, arg, call) {
   own <- if (is.object(x)) class(x)[[1L]]
-  gym_abort(
-    c(
-      paste0("`", arg, "` must be a policy or a function of observations, not ",
-             describe_argument(x), "."),
-      i = if (has_method(x, "predict")) {
-        "`as_policy()` makes a policy of a model that predicts actions."
-      } else if (!is.null(own)) {
-        paste0("`.S3method(\"act\", \"", own, "\", f)` makes `f` the method by which objects of ",
-               "its class act.")
-      }
-    ),
-    class = "gym_error_argument", argument = arg, value = x, call = call
+  abort_wrong(
+    arg, x, call,
+    "`{arg}` must be a policy or a function of observations, not {describe_argument(x)}.",
+    i = if (has_method(x, "predict")) {
+      "`as_policy()` makes a policy of a model that predicts actions."
+    } else if (!is.null(own)) {
+      '`.S3method("act", "{own}", f)` makes `f` the method by which objects of its class act.'
+    }
   )
 }
 
@@ -277,13 +271,12 @@ predict_policy <- function(policy, newdata, type, call = rlang::caller_env()) {
 
 #' @exportS3Method
 predict_policy.default <- function(policy, newdata, type, call = rlang::caller_env()) {
-  gym_abort(
-    c(paste0("`predict()` needs the policy to be a network, a table or a model, not ",
-             policy_text(policy), "."),
-      i = if (inherits(policy, "gym_policy_memory")) {
-        "`act(policy, observation, memory)` asks it by hand."
-      }),
-    class = "gym_error_argument", argument = "object", value = policy, call = call
+  abort_wrong(
+    "object", policy, call,
+    "`predict()` needs the policy to be a network, a table or a model, not {policy_text(policy)}.",
+    i = if (inherits(policy, "gym_policy_memory")) {
+      "`act(policy, observation, memory)` asks it by hand."
+    }
   )
 }
 
@@ -317,10 +310,10 @@ output_probabilities <- function(policy, outputs, call) {
 }
 
 abort_no_probabilities <- function(policy, call) {
-  gym_abort(
-    c(paste0("Only a policy that draws one of several actions has their probabilities, not ",
-             policy_text(policy), "."),
-      i = "`policy_network(output = \"softmax\")` makes one."),
-    class = "gym_error_argument", argument = "type", value = "probability", call = call
+  abort_wrong(
+    "type", "probability", call,
+    "Only a policy that draws one of several actions has their probabilities, not
+     {policy_text(policy)}.",
+    i = '`policy_network(output = "softmax")` makes one.'
   )
 }

@@ -6,10 +6,10 @@ check_training <- function(settings, call) {
   check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
-    gym_abort(
-      c(paste0("`seed` is one whole number, not ", length(settings$seed), " of them."),
-        i = "`seeds` trains once with each of several seeds."),
-      class = "gym_error_argument", argument = "seed", value = settings$seed, call = call
+    abort_wrong(
+      "seed", settings$seed, call,
+      "`seed` is one whole number, not {length(settings$seed)} of them.",
+      i = "`seeds` trains once with each of several seeds."
     )
   }
   check_seed(settings$seed, arg = "seed", call = call)
@@ -24,7 +24,7 @@ check_training <- function(settings, call) {
   )
   check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
   if (is.null(settings$iterations) && is.null(settings$total_steps)) {
-    abort_no_budget(unknown_arguments_hint(names(settings$kwargs), settings$agent), call)
+    abort_no_budget(names(settings$kwargs), settings$agent, NULL, call)
   }
   if (!is.null(settings$callback) && !is.function(settings$callback)) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
@@ -38,10 +38,10 @@ check_training <- function(settings, call) {
 # Otherwise it would be taken for an argument of the environment.
 check_no_steps <- function(names, call) {
   if ("steps" %in% names) {
-    gym_abort(
-      c("The budget in steps of the environment is the argument `total_steps`, not `steps`.",
-        i = "For an environment with an argument `steps`, call `gym_make()` first."),
-      class = "gym_error_argument", argument = "steps", call = call
+    abort_wrong(
+      "steps", NULL, call,
+      "The budget in steps of the environment is the argument `total_steps`, not `steps`.",
+      i = "For an environment with an argument `steps`, call `gym_make()` first."
     )
   }
 }
@@ -50,11 +50,10 @@ check_no_steps <- function(names, call) {
 check_not_of_agent <- function(names, of_agent, place, call) {
   own <- intersect(names, of_agent)
   if (length(own)) {
-    gym_abort(
-      c(paste0("`", own[[1L]], "` is an argument of the agent: ", sprintf(place, own[[1L]]), "."),
-        i = paste0("For an environment with an argument `", own[[1L]], "`, call `gym_make()` ",
-                   "first.")),
-      class = "gym_error_argument", argument = own[[1L]], call = call
+    abort_wrong(
+      own[[1L]], NULL, call,
+      "`{own[[1L]]}` is an argument of the agent: {sprintf(place, own[[1L]])}.",
+      i = "For an environment with an argument `{own[[1L]]}`, call `gym_make()` first."
     )
   }
 }
@@ -65,33 +64,27 @@ check_spelling <- function(names, choices, can_begin, call) {
   for (name in names) {
     near <- nearest_name(name, choices)
     if (length(near) && (plain_name(near) == plain_name(name) || !can_begin)) {
-      gym_abort(
-        c(paste0("There is no argument `", name, "`."), i = paste0("Did you mean `", near, "`?")),
-        class = "gym_error_argument", argument = name, call = call
+      abort_wrong(
+        name, NULL, call, "There is no argument `{name}`.",
+        i = "Did you mean `{near}`?"
       )
     }
   }
 }
 
-abort_no_budget <- function(hints = NULL, call) {
-  gym_abort(
-    c("Training needs a budget: give `iterations`, or `total_steps` of the environment.",
-      i = "`total_steps = 100000` is enough for a first look.", hints),
-    class = "gym_error_argument", argument = "iterations", call = call
-  )
-}
-
-# The names of arguments that train_agent() does not know: of the agent, misspelt, or really of the
-# environment.
-unknown_arguments_hint <- function(names, agent) {
+# The names are of arguments that train_agent() does not know: of the agent, misspelt, or really of
+# the environment.
+abort_no_budget <- function(names, agent, presets, call) {
   of_agent <- unlist(lapply(names, nearest_name, names(agent)))
-  c(
+  abort_wrong(
+    "iterations", NULL, call,
+    "Training needs a budget: give `iterations`, or `total_steps` of the environment.",
+    i = "`total_steps = 100000` is enough for a first look.", i = "{presets}",
     i = if (length(names)) {
-      paste0("These were taken for arguments of the environment: ",
-             quoted_names(names), ".")
+      "These were taken for arguments of the environment: {quoted_names(names)}."
     },
     i = if (length(of_agent)) {
-      paste0("An argument of the agent goes into its parentheses: `", of_agent[[1L]], "`.")
+      "An argument of the agent goes into its parentheses: `{of_agent[[1L]]}`."
     }
   )
 }
@@ -106,11 +99,10 @@ check_training_ends <- function(vector_env, settings, online, call) {
   }
   state <- state_without_end(model)
   if (!is.null(state)) {
-    gym_abort(
-      c(paste0("An episode of ", environment_label(vector_env), " that reaches state ", state,
-               " never ends."),
-        i = "Give `max_steps`, after which an episode is cut off, or let the model end there."),
-      class = "gym_error_argument", argument = "max_steps", call = call
+    abort_wrong(
+      "max_steps", NULL, call,
+      "An episode of {environment_label(vector_env)} that reaches state {state} never ends.",
+      i = "Give `max_steps`, after which an episode is cut off, or let the model end there."
     )
   }
 }
@@ -129,23 +121,22 @@ check_trained_policy <- function(policy, agent, call) {
 
 check_agent <- function(agent, call) {
   if (is.function(agent)) {
-    gym_abort(
-      c("`agent` must be an agent, not a function.",
-        i = "Did you forget the parentheses, as in `agent_ars()`?"),
-      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    abort_wrong(
+      "agent", agent, call, "`agent` must be an agent, not a function.",
+      i = "Did you forget the parentheses, as in `agent_ars()`?"
     )
   }
   if (!inherits(agent, "gym_agent")) {
-    gym_abort(
-      c(paste0("`agent` must be an agent made by a function such as `agent_ars()`, not ",
-               describe_argument(agent), "."),
-        i = if (is.character(agent)) {
-          paste0("There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`, ",
-                 "`agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables ",
-                 "`agent_monte_carlo()`, `agent_td()`, `agent_q()`, `agent_sarsa()`, ",
-                 "`agent_actor_critic()`. `learn_sb3()` trains by others, such as SAC.")
-        }),
-      class = "gym_error_argument", argument = "agent", value = agent, call = call
+    abort_wrong(
+      "agent", agent, call,
+      "`agent` must be an agent made by a function such as `agent_ars()`, not
+       {describe_argument(agent)}.",
+      i = if (is.character(agent)) {
+        "There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`,
+         `agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables `agent_monte_carlo()`,
+         `agent_td()`, `agent_q()`, `agent_sarsa()`, `agent_actor_critic()`. `learn_sb3()` trains
+         by others, such as SAC."
+      }
     )
   }
 }

@@ -36,8 +36,7 @@ run_scores <- function(trainings, curves, steps, call) {
   key <- paste(curves$training, curves$env_id, curves$seed)
   of_run <- split(curves, factor(key, unique(key)))
   if (!length(of_run)) {
-    gym_abort("There is nothing to compare: no policy was evaluated.", class = "gym_error_argument",
-              argument = "...", call = call)
+    abort_wrong("...", NULL, call, "There is nothing to compare: no policy was evaluated.")
   }
   ends <- vapply(of_run, function(run) max(run$steps), 0)
   budgets <- unique(unlist(lapply(trainings, function(x) {
@@ -51,10 +50,9 @@ run_scores <- function(trainings, curves, steps, call) {
   by_end <- is.null(steps) && same
   at <- steps %||% if (same && length(trainings)) budgets else min(ends)
   if (at > min(ends)) {
-    gym_abort(
-      c(paste0("Not all runs have taken ", whole_number_text(at), " steps."),
-        i = paste0("The shortest ended after ", whole_number_text(min(ends)), ".")),
-      class = "gym_error_argument", argument = "total_steps", value = at, call = call
+    abort_wrong(
+      "total_steps", at, call, "Not all runs have taken {whole_number_text(at)} steps.",
+      i = "The shortest ended after {whole_number_text(min(ends))}."
     )
   }
   score <- vapply(of_run, function(run) {
@@ -74,10 +72,9 @@ run_scores <- function(trainings, curves, steps, call) {
 check_same_environments <- function(runs, call) {
   ids <- lapply(split(runs$env_id, runs$training), function(ids) sort(unique(ids), na.last = TRUE))
   if (length(unique(ids)) > 1L) {
-    gym_abort(
-      c("All agents must have been trained in the same environments.",
-        x = paste0(names(ids), ": ", vapply(ids, toString, ""), collapse = "; ")),
-      class = "gym_error_argument", argument = "...", call = call
+    abort_wrong(
+      "...", NULL, call, "All agents must have been trained in the same environments.",
+      x = '{paste0(names(ids), ": ", vapply(ids, toString, ""), collapse = "; ")}'
     )
   }
 }
@@ -87,10 +84,10 @@ check_same_environments <- function(runs, call) {
 # The return of a random policy, and the environment's threshold.
 default_reference <- function(trainings, call) {
   if (!length(trainings)) {
-    gym_abort(
-      c("Scores of several environments are compared when they are normalised.",
-        i = "Give `reference`, a data frame with the columns env_id, low and high."),
-      class = "gym_error_argument", argument = "reference", call = call
+    abort_wrong(
+      "reference", NULL, call,
+      "Scores of several environments are compared when they are normalised.",
+      i = "Give `reference`, a data frame with the columns env_id, low and high."
     )
   }
   ones <- lapply(trainings, function(x) each_training(x)[[1L]])
@@ -98,10 +95,10 @@ default_reference <- function(trainings, call) {
   do.call(rbind, unname(lapply(ones, function(one) {
     high <- environment_threshold(one)
     if (is.null(high)) {
-      gym_abort(
-        c(paste0(one$env_id, " has no threshold, by which scores could be normalised."),
-          i = "Give `reference`, a data frame with the columns env_id, low and high."),
-        class = "gym_error_argument", argument = "reference", call = call
+      abort_wrong(
+        "reference", NULL, call,
+        "{one$env_id} has no threshold, by which scores could be normalised.",
+        i = "Give `reference`, a data frame with the columns env_id, low and high."
       )
     }
     random <- rlang::exec(
@@ -128,9 +125,9 @@ normalised_scores <- function(runs, reference, call) {
   span <- reference$high[at] - reference$low[at]
   if (anyNA(at) || !all(is.finite(span) & span != 0)) {
     wrong <- runs$env_id[is.na(at) | !is.finite(span) | span == 0][[1L]]
-    gym_abort(
-      paste0("`reference` must have a row for ", wrong, " with two different numbers."),
-      class = "gym_error_argument", argument = "reference", value = reference, call = call
+    abort_wrong(
+      "reference", reference, call,
+      "`reference` must have a row for {wrong} with two different numbers."
     )
   }
   (runs$score - reference$low[at]) / span

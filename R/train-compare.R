@@ -104,8 +104,7 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
     list()
   }
   if (!length(trainings) && !NROW(curves)) {
-    gym_abort("There is nothing to compare: give trainings.", class = "gym_error_argument",
-              argument = "...", call = call)
+    abort_wrong("...", NULL, call, "There is nothing to compare: give trainings.")
   }
   check_different_runs(trainings, call)
   settings <- list(
@@ -146,13 +145,13 @@ check_are_trainings <- function(given, call) {
   choices <- setdiff(names(formals(compare_trainings)), "...")
   several <- is.list(wrong[[1L]]) &&
     any(vapply(wrong[[1L]], inherits, NA, c("gym_training", "gym_trainings")))
-  gym_abort(
-    c(paste0(if (nzchar(name)) paste0("`", name, "`") else "Each argument",
-             " must be a training, not ", describe_argument(wrong[[1L]]), "."),
-      i = if (nzchar(name)) did_you_mean(name, choices),
-      i = if (inherits(wrong[[1L]], "gym_sweep")) "`sweep$comparison` compares its settings.",
-      i = if (several) "`do.call(compare_trainings, x)` compares the trainings of a list."),
-    class = "gym_error_argument", argument = "...", value = wrong[[1L]], call = call
+  abort_wrong(
+    "...", wrong[[1L]], call,
+    '{if (nzchar(name)) paste0("`", name, "`") else "Each argument"} must be a training, not
+     {describe_argument(wrong[[1L]])}.',
+    i = if (nzchar(name)) "{did_you_mean(name, choices)}",
+    i = if (inherits(wrong[[1L]], "gym_sweep")) "`sweep$comparison` compares its settings.",
+    i = if (several) "`do.call(compare_trainings, x)` compares the trainings of a list."
   )
 }
 
@@ -160,11 +159,11 @@ check_are_trainings <- function(given, call) {
 stop_at_target <- function(trainings, call) {
   stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)
   if (any(stops) && !all(stops)) {
-    gym_abort(
-      c(paste0("Some trainings stop at a target (", toString(names(trainings)[stops]),
-               "), and others do not (", toString(names(trainings)[!stops]), ")."),
-        i = "Train all with `target = Inf` to compare scores, or all with the same target."),
-      class = "gym_error_argument", argument = "...", call = call
+    abort_wrong(
+      "...", NULL, call,
+      "Some trainings stop at a target ({toString(names(trainings)[stops])}), and others do not
+       ({toString(names(trainings)[!stops])}).",
+      i = "Train all with `target = Inf` to compare scores, or all with the same target."
     )
   }
   any(stops)
@@ -177,11 +176,10 @@ check_different_runs <- function(trainings, call) {
   }, trainings, names(trainings)))
   if (anyDuplicated(keys)) {
     twice <- strsplit(keys[duplicated(keys)][[1L]], "\r", fixed = TRUE)[[1L]]
-    gym_abort(
-      c(paste0("Two trainings in ", twice[[2L]], " are called \"", twice[[1L]],
-               "\" and have the seed ", twice[[3L]], "."),
-        i = "Give each its own name: `compare_trainings(first = a, second = b)`."),
-      class = "gym_error_argument", argument = "...", value = twice[[1L]], call = call
+    abort_wrong(
+      "...", twice[[1L]], call,
+      'Two trainings in {twice[[2L]]} are called "{twice[[1L]]}" and have the seed {twice[[3L]]}.',
+      i = "Give each its own name: `compare_trainings(first = a, second = b)`."
     )
   }
 }
@@ -319,8 +317,7 @@ compare_by_steps <- function(trainings, level, call) {
   notes <- if (any(runs$interrupted)) interrupted_note(sum(runs$interrupted))
   runs <- runs[!runs$interrupted, names(runs) != "interrupted"]
   if (!nrow(runs)) {
-    gym_abort("There is nothing to compare: all runs were interrupted.",
-              class = "gym_error_argument", argument = "...", call = call)
+    abort_wrong("...", NULL, call, "There is nothing to compare: all runs were interrupted.")
   }
   key <- paste(runs$training, runs$env_id, sep = "\r")
   profiles <- lapply(split(runs, factor(key, unique(key))), reached_profile, level)

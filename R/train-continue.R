@@ -59,11 +59,11 @@ take_over <- function(earlier, agent, call) {
   )
   if (length(differ)) {
     name <- sub("memory_size", "memory", differ[[1L]])
-    gym_abort(
-      c(paste0("The earlier training has another `", name, "`, which must stay when it goes on."),
-        i = paste0("Give the same `", name, "`, or start with the policy alone: ",
-                   "`policy = agent_policy(training$agent)`.")),
-      class = "gym_error_argument", argument = name, value = agent[[differ[[1L]]]], call = call
+    abort_wrong(
+      name, agent[[differ[[1L]]]], call,
+      "The earlier training has another `{name}`, which must stay when it goes on.",
+      i = "Give the same `{name}`, or start with the policy alone: `policy =
+           agent_policy(training$agent)`."
     )
   }
   earlier[settings] <- agent[settings]
@@ -75,12 +75,12 @@ check_still_learns <- function(agent, call) {
   rate <- agent$learning_rate
   taken <- agent$steps %||% agent$taken
   if (is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0)) {
-    gym_abort(
-      c(paste0("The schedule of `learning_rate` is 0 after the agent's ", count_of(taken, "step"),
-               ", so it would learn nothing more."),
-        i = paste("Give a new `learning_rate` along with `policy = training`, or set it:",
-                  "`agent$learning_rate <- 1e-4`.")),
-      class = "gym_error_argument", argument = "learning_rate", value = rate, call = call
+    abort_wrong(
+      "learning_rate", rate, call,
+      "The schedule of `learning_rate` is 0 after the agent's {count_of(taken, \"step\")}, so it
+       would learn nothing more.",
+      i = "Give a new `learning_rate` along with `policy = training`, or set it:
+           `agent$learning_rate <- 1e-4`."
     )
   }
 }
@@ -90,11 +90,10 @@ continued_agent <- function(agent, bound, call) {
   if (learns_online(agent)) {
     for (space in names(agent$spaces)) {
       if (!identical(format(agent$spaces[[space]]), format(bound[[space]]))) {
-        gym_abort(
-          paste0("The agent has learned with the ", sub("_", " ", space), " ",
-                 format(agent$spaces[[space]]), ", and this environment has ",
-                 format(bound[[space]]), "."),
-          class = "gym_error_argument", argument = "env", call = call
+        abort_wrong(
+          "env", NULL, call,
+          'The agent has learned with the {sub("_", " ", space)} {format(agent$spaces[[space]])},
+           and this environment has {format(bound[[space]])}.'
         )
       }
     }

@@ -119,17 +119,15 @@ curve_rows <- function(x, label, call) {
 
 read_curves <- function(path, call) {
   if (!file.exists(path)) {
-    gym_abort(paste0("There is no file or folder \"", path, "\"."), class = "gym_error_argument",
-              argument = "...", value = path, call = call)
+    abort_wrong("...", path, call, 'There is no file or folder "{path}".')
   }
   rows <- read_logs(path, call)[[1L]]
   if (is.null(rows)) {
-    gym_abort(
-      c(paste0("\"", path, "\" has no log of a training."),
-        i = paste("A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of",
-                  "Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`."),
-        i = if (endsWith(path, ".rds")) "A result that `readRDS()` returns is an argument, too."),
-      class = "gym_error_argument", argument = "...", value = path, call = call
+    abort_wrong(
+      "...", path, call, '"{path}" has no log of a training.',
+      i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
+           Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
+      i = if (endsWith(path, ".rds")) "A result that `readRDS()` returns is an argument, too."
     )
   }
   # Runs with unknown seeds are numbered.
@@ -161,9 +159,9 @@ read_logs <- function(paths, call, read = function(path) path_curves(path, call)
 
 abort_damaged <- function(path, cnd, call) {
   if (inherits(cnd, "gym_error_argument")) rlang::cnd_signal(cnd)
-  gym_abort(
-    c(paste0("The log \"", path, "\" is damaged."), x = conditionMessage(cnd)),
-    class = "gym_error_argument", argument = "...", value = path, call = call
+  abort_wrong(
+    "...", path, call, 'The log "{path}" is damaged.',
+    x = "{conditionMessage(cnd)}"
   )
 }
 

@@ -258,10 +258,9 @@ model_to_sample <- function(settings, call) {
   model <- settings$model
   id <- model$spec$id
   if (is.null(settings$max_steps) && is.null(model$spec$max_episode_steps)) {
-    gym_abort(
-      c(paste0(id, " has no step limit, so an episode may never end."),
-        i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."),
-      class = "gym_error_argument", argument = "max_steps", call = call
+    abort_wrong(
+      "max_steps", NULL, call, "{id} has no step limit, so an episode may never end.",
+      i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."
     )
   }
   cli::cli_inform(

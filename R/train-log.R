@@ -108,10 +108,10 @@ append_lines <- function(table, lines) {
 }
 
 abort_log <- function(folder, cnd, call) {
-  gym_abort(
-    c(paste0("The log cannot be written to \"", folder, "\"."), x = conditionMessage(cnd),
-      i = "Give another folder as `log`."),
-    class = "gym_error_argument", argument = "log", value = folder, call = call
+  abort_wrong(
+    "log", folder, call, 'The log cannot be written to "{folder}".',
+    x = "{conditionMessage(cnd)}",
+    i = "Give another folder as `log`."
   )
 }
 

@@ -10,12 +10,11 @@
 with_masks <- function(vector_env, name, note, call) {
   env <- vector_env$env
   if (vector_env$one_seed || !"return_info" %in% names(formals(env$reset))) {
-    gym_abort(
-      c(paste0("`mask` needs the infos of ", environment_label(vector_env),
-               ", which are not available in this vector environment."),
-        i = paste("Use a single environment, or one made by `gym_make()` with",
-                  "vectorization_mode \"sync\".")),
-      class = "gym_error_argument", argument = "mask", value = name, call = call
+    abort_wrong(
+      "mask", name, call,
+      "`mask` needs the infos of {environment_label(vector_env)}, which are not available in this
+       vector environment.",
+      i = 'Use a single environment, or one made by `gym_make()` with vectorization_mode "sync".'
     )
   }
   vector_env[c("reset", "step")] <- masked_functions(env, vector_env, name, note, call)
@@ -87,11 +86,11 @@ mask_in <- function(info, name, n, actions, call) {
   right <- (is.numeric(mask) || is.logical(mask)) && length(mask) == n * count &&
     (n == 1L || identical(dim(mask), c(n, count)))
   if (!right) {
-    gym_abort(
-      paste0("The info's `", name, "` must be a number or TRUE or FALSE for each of ",
-             count_of(count, "action"), if (n > 1L) paste(" and of", n, "sub-environments"),
-             ", not ", describe_argument(mask), "."),
-      class = "gym_error_argument", argument = "mask", value = mask, call = call
+    abort_wrong(
+      "mask", mask, call,
+      "The info's `{name}` must be a number or TRUE or FALSE for each of
+       {count_of(count, \"action\")}{if (n > 1L) paste(\" and of\", n, \"sub-environments\")}, not
+       {describe_argument(mask)}."
     )
   }
   matrix(mask != 0, n, count)
@@ -101,10 +100,10 @@ needed_mask <- function(info, name, n, actions, call) {
   mask <- mask_in(info, name, n, actions, call)
   if (is.null(mask)) {
     has <- names(info)
-    gym_abort(
-      c(paste0("`mask` names \"", name, "\", but the environment's info has no such element."),
-        i = if (length(has)) paste0("It has ", paste0("\"", has, "\"", collapse = ", "), ".")),
-      class = "gym_error_argument", argument = "mask", value = name, call = call
+    abort_wrong(
+      "mask", name, call,
+      "`mask` names \"{name}\", but the environment's info has no such element.",
+      i = if (length(has)) 'It has {paste0("\\"", has, "\\"", collapse = ", ")}.'
     )
   }
   mask
@@ -121,10 +120,10 @@ forbid_actions <- function(learner, agent, observation, mask, call) {
     forbidden <- !mask[i, ]
     for (store in learner$stores) store$forbid(row[[i]], forbidden)
     if (all(learner$stores[[1L]]$row(row[[i]]) == -Inf)) {
-      gym_abort(
-        paste0("The info's `", agent$mask, "` forbids every action at the observation ",
-               describe_value(batch_value(agent$spaces$observation_space, observation, i)), "."),
-        class = "gym_error_argument", argument = "mask", value = mask[i, ], call = call
+      abort_wrong(
+        "mask", mask[i, ], call,
+        "The info's `{agent$mask}` forbids every action at the observation
+         {describe_value(batch_value(agent$spaces$observation_space, observation, i))}."
       )
     }
   }

@@ -77,10 +77,9 @@ as.data.frame.gym_training <- function(x, row.names = NULL, optional = FALSE, ..
 # Ignoring this argument would return another table than the user asked for.
 check_no_curve <- function(..., call = rlang::caller_env()) {
   if (any(c("curve", "curves") %in% ...names())) {
-    gym_abort(
-      c("`as.data.frame()` has no argument `curve`.",
-        i = "`learning_curves()` gives the evaluations of all seeds and trainings."),
-      class = "gym_error_argument", argument = "curve", call = call
+    abort_wrong(
+      "curve", NULL, call, "`as.data.frame()` has no argument `curve`.",
+      i = "`learning_curves()` gives the evaluations of all seeds and trainings."
     )
   }
 }

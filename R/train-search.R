@@ -74,9 +74,9 @@ best_round_line <- function(x) {
 
 check_found <- function(object, call = rlang::caller_env()) {
   if (is.null(object$policy)) {
-    gym_abort(
-      "The search has no policy: it ended before the first round was played to its end.",
-      class = "gym_error_argument", argument = "object", value = object, call = call
+    abort_wrong(
+      "object", object, call,
+      "The search has no policy: it ended before the first round was played to its end."
     )
   }
 }

@@ -3,10 +3,9 @@
 check_training_seeds <- function(seeds, seed, call) {
   check_seeds(seeds, call)
   if (!is.null(seed)) {
-    gym_abort(
-      c("`seed` and `seeds` cannot both be given.",
-        i = "`seed` makes one training, `seeds` one with each."),
-      class = "gym_error_argument", argument = "seed", value = seed, call = call
+    abort_wrong(
+      "seed", seed, call, "`seed` and `seeds` cannot both be given.",
+      i = "`seed` makes one training, `seeds` one with each."
     )
   }
 }
@@ -69,11 +68,10 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
 # Without a target, no seed solves a search.
 check_has_target <- function(settings, vector_env, call) {
   if (is.null(training_target(settings, vector_env$spec))) {
-    gym_abort(
-      c(paste(environment_label(vector_env), "has no reward threshold, so a search needs a",
-              "target."),
-        i = "Give the mean return that solves it as `target`."),
-      class = "gym_error_argument", argument = "target", call = call
+    abort_wrong(
+      "target", NULL, call,
+      "{environment_label(vector_env)} has no reward threshold, so a search needs a target.",
+      i = "Give the mean return that solves it as `target`."
     )
   }
 }

@@ -12,6 +12,22 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   )
 }
 
+#' Abort because of an argument
+#'
+#' @param argument,value Its name and its value.
+#' @param ... The lines of the message, with the names of bullets. They are templates of
+#'   `cli::format_inline()`, whose `{}` are evaluated where this function is called. A line break is
+#'   a space, and a line without text is left out.
+#' @noRd
+abort_wrong <- function(argument, value, call, ..., .envir = rlang::caller_env()) {
+  lines <- gsub("\n *", " ", c(...))
+  lines[] <- vapply(lines, cli::format_inline, "", .envir = .envir, keep_whitespace = TRUE)
+  gym_abort(
+    lines[nzchar(lines)], class = "gym_error_argument", argument = argument, value = value,
+    call = call
+  )
+}
+
 #' Let errors name the call of the function that the user called
 #'
 #' @param code Calls other functions that users call, too.
