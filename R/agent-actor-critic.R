@@ -46,13 +46,10 @@ agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate 
   new_learner("gym_agent_actor_critic", settings)
 }
 
-# The weights are the critic's; the actor's are the preferences.
-#' @exportS3Method
-value_columns_of.gym_agent_actor_critic <- function(agent) 1L
-
 #' @export
 agent_start.gym_agent_actor_critic <- function(agent, policy) {
   agent <- NextMethod()
+  # The weights are the critic's; the actor's are the preferences.
   columns <- as.integer(agent$spaces$action_space$n)
   preferences <- if (!is.null(agent$weights)) matrix(0, nrow(agent$weights), columns)
   possible <- policy$possible
@@ -108,11 +105,7 @@ learner_of.gym_agent_actor_critic <- function(agent, draw) {
         act(after)
       }
     },
-    taken = function() taken,
-    export = function(agent) {
-      agent["preferences"] <- list(actor$get())
-      agent
-    },
+    keeps = function() list(taken = taken, preferences = actor$get()),
     stores = list(actor)
   )
 }

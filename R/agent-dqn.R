@@ -77,7 +77,8 @@ agent_dqn <- function(memory = 50000, learning_starts = 1000, batch = 64, update
   check_count(target_every)
   check_number(target_rate, min = 0, max = 1, allow_null = TRUE)
   check_number(max_grad_norm, min = 0)
-  check_iteration(batch_steps, min_episodes)
+  check_count(batch_steps)
+  check_count(min_episodes)
   names(settings)[[1L]] <- "memory_size"
   new_gradient_agent("dqn", c(settings, list(carried = 0)), dqn_log)
 }
@@ -87,7 +88,23 @@ dqn_log <- c("loss", "n_updates", "exploration_rate", "learning_rate")
 #' @export
 agent_start.gym_agent_dqn <- function(agent, policy) {
   agent <- NextMethod()
-  check_values(policy, "DQN")
+  space <- policy$action_space
+  if (!inherits(space, "gym_space_discrete")) {
+    abort_wrong(
+      "env", NULL, NULL,
+      "DQN learns a value for each action of a Discrete space, but the actions of
+       {env_text(policy)} are of {format(space)}.",
+      i = "Use `agent_ppo()` for these actions."
+    )
+  }
+  if (!identical(policy$output, "epsilon-greedy") || utils::tail(policy$sizes, 1L) != space$n) {
+    abort_wrong(
+      "policy", policy, NULL,
+      'DQN needs a network with a value for each of {count_of(space$n, "action")} and the output
+       "epsilon-greedy", not {format(policy)}.',
+      i = '`policy_network(c(NA, 64, 64, NA), output = "epsilon-greedy")` is one.'
+    )
+  }
   agent$target <- weight_vector(policy)
   agent$adam <- new_adam(count_weights(policy))
   agent$updates <- agent$carried <- 0
@@ -219,7 +236,7 @@ recalled <- function(memory, policy, at) {
 
 #' @export
 format.gym_agent_dqn <- function(x, ...) {
-  gradient_text(if (x$double) "Double DQN" else "DQN", c(memory = x$memory_size, x[c(
+  agent_text(if (x$double) "Double DQN" else "DQN", c(memory = x$memory_size, x[c(
     "batch", "updates_per_step", "learning_rate", "gamma", "epsilon"
   )]))
 }

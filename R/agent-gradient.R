@@ -166,11 +166,6 @@ check_scheduled <- function(settings, names, call = rlang::caller_env()) {
   }
 }
 
-check_iteration <- function(batch_steps, min_episodes, call = rlang::caller_env()) {
-  check_count(batch_steps, arg = "batch_steps", call = call)
-  check_count(min_episodes, arg = "min_episodes", call = call)
-}
-
 # An agent that follows the gradient of log-probabilities needs a policy that has them.
 check_has_log_prob <- function(policy, name) {
   if (!has_log_prob(policy)) {
@@ -182,32 +177,6 @@ check_has_log_prob <- function(policy, name) {
       i = '`output = "{if (box) "gaussian" else "softmax"}"` makes it one.'
     )
   }
-}
-
-# An agent that learns values needs one value for each action.
-check_values <- function(policy, name) {
-  space <- policy$action_space
-  outputs <- policy$sizes[[length(policy$sizes)]]
-  if (!inherits(space, "gym_space_discrete")) {
-    abort_wrong(
-      "env", NULL, NULL,
-      "{name} learns a value for each action of a Discrete space, but the actions of
-       {env_text(policy)} are of {format(space)}.",
-      i = "Use `agent_ppo()` for these actions."
-    )
-  }
-  if (!identical(policy$output, "epsilon-greedy") || outputs != space$n) {
-    abort_wrong(
-      "policy", policy, NULL,
-      '{name} needs a network with a value for each of {count_of(space$n, "action")} and the
-       output "epsilon-greedy", not {format(policy)}.',
-      i = '`policy_network(c(NA, 64, 64, NA), output = "epsilon-greedy")` is one.'
-    )
-  }
-}
-
-gradient_text <- function(name, settings) {
-  agent_text(name, Filter(Negate(is.function), settings))
 }
 
 # Returns and advantages ---------------------------------------------------------------

@@ -46,10 +46,26 @@ agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL
                               learning_rate = NULL, mask = NULL,
                               importance = c("none", "weighted", "ordinary"),
                               target_policy = NULL) {
-  importance <- check_choice(
-    importance[1L], c("none", "weighted", "ordinary"), arg = "importance"
-  )
-  check_importance(importance, target_policy, temperature, exploring_starts, learning_rate)
+  call <- rlang::current_env()
+  importance <- check_choice(importance[1L], c("none", "weighted", "ordinary"), "importance", call)
+  if (importance == "none" && !is.null(target_policy)) {
+    abort_wrong(
+      "target_policy", target_policy, call,
+      "`target_policy` needs `importance`, because another policy plays the episodes."
+    )
+  }
+  if (!is.null(target_policy) && !inherits(target_policy, "gym_policy_table")) {
+    must <- "a table, whose probabilities are known, or NULL"
+    abort_argument(target_policy, must, "target_policy", call)
+  }
+  explores_else <- !is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)
+  if (importance != "none" && explores_else) {
+    abort_wrong(
+      "importance", importance, call,
+      "`importance` works with `epsilon` only: leave out `temperature`, `exploring_starts` and
+       `learning_rate`."
+    )
+  }
   visits <- check_choice(visits[1L], c("first", "every"), arg = "visits")
   check_flag(exploring_starts)
   settings <- list(
@@ -62,30 +78,6 @@ agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL
   new_learner("gym_agent_monte_carlo", settings)
 }
 
-check_importance <- function(importance, target_policy, temperature, exploring_starts,
-                             learning_rate, call = rlang::caller_env()) {
-  if (importance == "none") {
-    if (!is.null(target_policy)) {
-      abort_wrong(
-        "target_policy", target_policy, call,
-        "`target_policy` needs `importance`, because another policy plays the episodes."
-      )
-    }
-    return()
-  }
-  if (!is.null(target_policy) && !inherits(target_policy, "gym_policy_table")) {
-    must <- "a table, whose probabilities are known, or NULL"
-    abort_argument(target_policy, must, "target_policy", call)
-  }
-  if (!is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)) {
-    abort_wrong(
-      "importance", importance, call,
-      "`importance` works with `epsilon` only: leave out `temperature`, `exploring_starts` and
-       `learning_rate`."
-    )
-  }
-}
-
 #' @export
 agent_start.gym_agent_monte_carlo <- function(agent, policy) {
   agent <- NextMethod()
@@ -96,38 +88,60 @@ agent_start.gym_agent_monte_carlo <- function(agent, policy) {
 
 #' @exportS3Method
 learner_of.gym_agent_monte_carlo <- function(agent, draw) {
-  if (agent$importance != "none") {
-    return(off_policy_steps(agent, draw))
-  }
   learning <- learning_of(agent, draw)
   row <- learning$store$row
-  choose <- learning$choose
   taken <- agent$taken
-  returns <- new_returns(agent, learning$store)
   episode_of <- for_each_sub_env(new_episode)
+  own <- if (agent$importance == "none") {
+    on_policy(agent, learning)
+  } else {
+    off_policy(agent, learning, draw)
+  }
+  choose <- own$choose
   starts <- agent$exploring_starts
   new_steps(
     agent, learning,
     act = function(x, sub_env, observation) {
-      values <- row(x)
-      if (starts) draw_place(values > -Inf, draw()) else choose(values, taken)
+      if (starts) draw_place(row(x) > -Inf, draw()) else choose(x, sub_env, taken)
     },
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       episode <- episode_of(sub_env)
       episode$add(x, column, reward)
       taken <<- taken + 1
       if (ended) {
-        returns$learn(episode$take(), taken)
+        own$learn(episode$take(), sub_env, taken)
         NA_integer_
       } else {
-        choose(row(after), taken)
+        choose(after, sub_env, taken)
       }
     },
-    taken = function() taken,
-    export = function(agent) {
-      agent$visited <- returns$visited()
-      agent
-    }
+    keeps = function() list(taken = taken, visited = own$visited())
+  )
+}
+
+#' Learn the means of returns
+#' @return A list of functions: `choose(x, sub_env, taken)` chooses an action;
+#'   `learn(episode, sub_env, taken)` learns from the steps of a whole episode; `visited()` returns
+#'   how often each state and action has counted.
+#' @noRd
+on_policy <- function(agent, learning) {
+  store <- learning$store
+  visited <- agent$visited
+  rate <- if (!is.null(agent$learning_rate)) rate_of(agent$learning_rate)
+  list(
+    choose = function(x, sub_env, taken) learning$choose(store$row(x), taken),
+    learn = function(episode, sub_env, taken) {
+      cell <- store$cells(episode$x, episode$column)
+      returns <- sum_backwards(episode$reward, agent$discount)
+      first <- agent$visits == "first"
+      for (i in if (first) which(!duplicated(cell)) else rev(seq_along(cell))) {
+        at <- cell[[i]]
+        visited[[at]] <<- visited[[at]] + 1
+        share <- if (is.null(rate)) 1 / visited[[at]] else rate(taken)
+        store$toward(episode$x[[i]], episode$column[[i]], returns[[i]], share)
+      }
+    },
+    visited = function() visited
   )
 }
 
@@ -135,74 +149,48 @@ learner_of.gym_agent_monte_carlo <- function(agent, draw) {
 #'
 #' The weight of a return is how much more likely the policy takes the actions after its own (Sutton
 #' and Barto 2018, section 5.7). The probabilities are those at the time of the action.
+#' @return As [on_policy()]; `visited()` returns the sums of weights.
 #' @noRd
-off_policy_steps <- function(agent, draw) {
-  learning <- learning_of(agent, draw)
+off_policy <- function(agent, learning, draw) {
   store <- learning$store
-  taken <- agent$taken
-  weight_of <- agent$visited
+  visited <- agent$visited
   weighted <- agent$importance == "weighted"
-  discount <- agent$discount
   epsilon <- rate_of(agent$epsilon, "epsilon")
-  target <- target_probabilities(agent, store$row)
+  probabilities <- if (!is.null(agent$learns)) table_probabilities(agent$learns)
   ratios <- for_each_sub_env(new_episode)
-  episodes <- for_each_sub_env(new_episode)
-  act <- function(x, sub_env) {
-    wanted <- target(x)
-    possible <- store$row(x) > -Inf
-    explores <- epsilon(taken)
-    plays <- (1 - explores) * wanted + explores * possible / sum(possible)
-    column <- draw_place(plays, draw())
-    ratios(sub_env)$add(0L, 0L, wanted[[column]] / plays[[column]])
-    column
-  }
-  learn <- function(episode, ratio) {
-    cell <- store$cells(episode$x, episode$column)
-    returns <- sum_backwards(episode$reward, discount)
-    weight <- 1
-    for (i in rev(seq_along(cell))) {
-      at <- cell[[i]]
-      counts <- if (weighted) weight else 1
-      if (counts > 0) {
-        weight_of[[at]] <<- weight_of[[at]] + counts
-        goal <- if (weighted) returns[[i]] else weight * returns[[i]]
-        store$toward(episode$x[[i]], episode$column[[i]], goal, counts / weight_of[[at]])
-      }
-      weight <- weight * ratio[[i]]
-    }
-  }
-  new_steps(
-    agent, learning,
-    act = function(x, sub_env, observation) act(x, sub_env),
-    observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
-      episode <- episodes(sub_env)
-      episode$add(x, column, reward)
-      taken <<- taken + 1
-      if (ended) {
-        learn(episode$take(), ratios(sub_env)$take()$reward)
-        NA_integer_
+  list(
+    choose = function(x, sub_env, taken) {
+      values <- store$row(x)
+      wanted <- if (is.null(probabilities)) {
+        replace(numeric(length(values)), which.max(values), 1)
       } else {
-        act(after, sub_env)
+        probabilities[x, ]
+      }
+      possible <- values > -Inf
+      explores <- epsilon(taken)
+      plays <- (1 - explores) * wanted + explores * possible / sum(possible)
+      column <- draw_place(plays, draw())
+      ratios(sub_env)$add(0L, 0L, wanted[[column]] / plays[[column]])
+      column
+    },
+    learn = function(episode, sub_env, taken) {
+      ratio <- ratios(sub_env)$take()$reward
+      cell <- store$cells(episode$x, episode$column)
+      returns <- sum_backwards(episode$reward, agent$discount)
+      weight <- 1
+      for (i in rev(seq_along(cell))) {
+        at <- cell[[i]]
+        counts <- if (weighted) weight else 1
+        if (counts > 0) {
+          visited[[at]] <<- visited[[at]] + counts
+          goal <- if (weighted) returns[[i]] else weight * returns[[i]]
+          store$toward(episode$x[[i]], episode$column[[i]], goal, counts / visited[[at]])
+        }
+        weight <- weight * ratio[[i]]
       }
     },
-    taken = function() taken,
-    export = function(agent) {
-      agent$visited <- weight_of
-      agent
-    }
+    visited = function() visited
   )
-}
-
-# The probability of each action under the policy that is learned about, a function of a state.
-target_probabilities <- function(agent, row) {
-  if (is.null(agent$learns)) {
-    return(function(x) {
-      values <- row(x)
-      replace(numeric(length(values)), which.max(values), 1)
-    })
-  }
-  probabilities <- table_probabilities(agent$learns)
-  function(x) probabilities[x, ]
 }
 
 #' @export
@@ -293,31 +281,6 @@ new_episode <- function() {
   )
 }
 
-#' Keep the means of returns
-#' @return A list of functions: `learn(episode, taken)` learns from the steps of a whole episode;
-#'   `visited()` returns how often each state and action has counted.
-#' @noRd
-new_returns <- function(agent, store) {
-  visited <- agent$visited
-  rate <- if (!is.null(agent$learning_rate)) rate_of(agent$learning_rate)
-  discount <- agent$discount
-  first_only <- agent$visits == "first"
-  list(
-    learn = function(episode, taken) {
-      cell <- store$cells(episode$x, episode$column)
-      returns <- sum_backwards(episode$reward, discount)
-      counted <- if (first_only) which(!duplicated(cell)) else rev(seq_along(cell))
-      for (i in counted) {
-        at <- cell[[i]]
-        visited[[at]] <<- visited[[at]] + 1
-        share <- if (is.null(rate)) 1 / visited[[at]] else rate(taken)
-        store$toward(episode$x[[i]], episode$column[[i]], returns[[i]], share)
-      }
-    },
-    visited = function() visited
-  )
-}
-
 #' @export
 format.gym_agent_monte_carlo <- function(x, ...) {
   how <- if (x$importance == "none") {
@@ -325,8 +288,7 @@ format.gym_agent_monte_carlo <- function(x, ...) {
   } else {
     paste(x$importance, "importance sampling")
   }
-  name <- paste0("Monte Carlo (", how, ")")
-  learner_text(name, x)
+  learner_text(paste0("Monte Carlo (", how, ")"), x)
 }
 
 #' @rdname agent_monte_carlo

@@ -86,7 +86,8 @@ agent_ppo <- function(batch_steps = 2048, batch = 64, epochs = 10, learning_rate
                       max_grad_norm = 0.5, normalize_advantages = TRUE, normalize_rewards = FALSE,
                       target_kl = NULL, min_episodes = 8) {
   settings <- mget(names(formals()))
-  check_iteration(batch_steps, min_episodes)
+  check_count(batch_steps)
+  check_count(min_episodes)
   check_number(batch, min = 1)
   if (is.finite(batch) && batch > batch_steps) {
     must <- paste("at most `batch_steps`,", number_text(batch_steps), "or Inf")
@@ -176,7 +177,11 @@ ppo_update <- function(policy, value, weights, adam, rows, epochs, settings) {
   for (batches in epochs) {
     divergences <- numeric()
     for (at in batches) {
-      step <- ppo_gradient(policy, value, weights, batch_of_rows(rows, at), settings)
+      batch <- lapply(rows[c("log_prob", "advantage", "return")], `[`, at)
+      batch$inputs <- rows$inputs[, at, drop = FALSE]
+      action <- rows$action
+      batch$action <- if (is.matrix(action)) action[, at, drop = FALSE] else action[at]
+      step <- ppo_gradient(policy, value, weights, batch, settings)
       log[[length(log) + 1L]] <- step$log
       divergences <- c(divergences, step$log[["approx_kl"]])
       too_far <- isTRUE(step$log[["approx_kl"]] > 1.5 * settings$target_kl)
@@ -193,14 +198,6 @@ ppo_update <- function(policy, value, weights, adam, rows, epochs, settings) {
   means[["approx_kl"]] <- mean(divergences)
   means[["loss"]] <- log[nrow(log), "loss"]
   list(weights = weights, adam = adam, log = means)
-}
-
-batch_of_rows <- function(rows, at) {
-  list(
-    inputs = rows$inputs[, at, drop = FALSE],
-    action = if (is.matrix(rows$action)) rows$action[, at, drop = FALSE] else rows$action[at],
-    log_prob = rows$log_prob[at], advantage = rows$advantage[at], return = rows$return[at]
-  )
 }
 
 #' Differentiate the loss of a minibatch
@@ -250,7 +247,7 @@ ppo_forward <- function(policy, value, weights, inputs, action) {
 
 #' @export
 format.gym_agent_ppo <- function(x, ...) {
-  gradient_text("PPO", x[c("batch_steps", "batch", "epochs", "learning_rate", "gamma", "lambda",
+  agent_text("PPO", x[c("batch_steps", "batch", "epochs", "learning_rate", "gamma", "lambda",
                            "clip")])
 }
 

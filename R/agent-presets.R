@@ -186,6 +186,9 @@ preset_training <- function(preset, training, budget) {
 
 # The agent, which keeps for provenance() where its settings are from.
 with_preset <- function(agent, preset, given) {
+  if (is.null(preset)) {
+    return(agent)
+  }
   agent$preset <- preset[intersect(c("env_id", "kwargs", "origin", "source"), names(preset))]
   agent$preset$changed <- intersect(given, c(names(preset), "policy", "iterations"))
   agent

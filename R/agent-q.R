@@ -135,11 +135,7 @@ learner_of.gym_agent_q <- function(agent, draw) {
       if (!own_row || x == after) values <- row(after)
       choose(values, taken)
     },
-    taken = function() taken,
-    export = function(agent) {
-      if (!is.null(memory)) agent$memory <- memory$get()
-      agent
-    }
+    keeps = function() c(list(taken = taken), if (!is.null(memory)) list(memory = memory$get()))
   )
 }
 
@@ -170,11 +166,7 @@ double_steps <- function(agent, draw) {
       taken <<- taken + 1
       if (ended) NA_integer_ else choose(both(after), taken)
     },
-    taken = function() taken,
-    export = function(agent) {
-      agent$second <- second$get()
-      agent
-    },
+    keeps = function() list(taken = taken, second = second$get()),
     stores = list(first, second)
   )
 }
@@ -234,33 +226,23 @@ new_planning_memory <- function(agent, store) {
   )
 }
 
-#' @exportS3Method
-action_weights.gym_agent_q <- function(agent) {
-  if (agent$double && !is.null(agent$second)) (agent$weights + agent$second) / 2 else agent$weights
-}
-
 #' @export
 format.gym_agent_q <- function(x, ...) {
   plans <- x$planning > 0L
   curious <- plans && x$bonus > 0
   name <- if (x$double) "Double Q-learning" else if (plans) "Dyna-Q" else "Q-learning"
-  learner_text(
-    paste0(name, if (curious) "+"), x,
-    c(if (plans) list(planning = x$planning), if (curious) list(bonus = x$bonus))
-  )
+  learner_text(paste0(name, if (curious) "+"), x, x[c(if (plans) "planning", if (curious) "bonus")])
 }
 
 #' @rdname agent_q
 #' @export
 learn_q <- function(env, ...) {
-  if (is.data.frame(env) || inherits(env, "gym_rollout")) {
-    return(learn_q_from_data(env, list(...), rlang::current_env()))
+  if (!is.data.frame(env) && !inherits(env, "gym_rollout")) {
+    return(make_and_train("agent_q", env, ..., defaults = list(episodes = 10)))
   }
-  make_and_train("agent_q", env, ..., defaults = list(episodes = 10))
-}
-
-# Nobody acts while a table is learned from data, so most arguments have no meaning.
-learn_q_from_data <- function(data, given, call) {
+  call <- rlang::current_env()
+  given <- list(...)
+  # Nobody acts while a table is learned from data, so most arguments have no meaning.
   unfit <- setdiff(rlang::names2(given), c("discount", "double", "iterations"))
   if (length(unfit)) {
     abort_wrong(
@@ -271,8 +253,8 @@ learn_q_from_data <- function(data, given, call) {
   discount <- given[["discount"]] %||% 0.99
   double <- given[["double"]] %||% FALSE
   iterations <- given[["iterations"]]
-  check_discount(discount, call = call)
-  check_flag(double, call = call)
-  check_count(iterations, allow_null = TRUE, call = call)
-  learn_table(data, discount, double, iterations, call)
+  check_discount(discount)
+  check_flag(double)
+  check_count(iterations, allow_null = TRUE)
+  learn_table(env, discount, double, iterations, call)
 }

@@ -56,7 +56,8 @@ agent_reinforce <- function(batch_steps = 1000, learning_rate = 0.01, gamma = 0.
                             entropy = 0, normalize_advantages = TRUE, max_grad_norm = Inf,
                             min_episodes = 8) {
   settings <- mget(names(formals()))
-  check_iteration(batch_steps, min_episodes)
+  check_count(batch_steps)
+  check_count(min_episodes)
   check_scheduled(settings, c("learning_rate", "value_learning_rate", "entropy"))
   check_number(gamma, min = 0, max = 1)
   check_flag(baseline)
@@ -116,7 +117,19 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
   agent$policy <- with_weights(policy, moved$weights)
   agent$adam <- moved$adam
 
-  if (agent$baseline) agent <- fit_baseline(agent, rows$inputs, return, now$value_learning_rate)
+  if (agent$baseline) {
+    # Steps down the gradient of the squared error.
+    weights <- weight_vector(agent$value)
+    for (update in seq_len(agent$value_updates)) {
+      forward <- forward_network(agent$value, weights, rows$inputs)
+      gradient <- backward_network(forward, 2 / n * (forward$outputs - return))
+      moved <- adam_step(weights, gradient, agent$value_adam, now$value_learning_rate)
+      weights <- moved$weights
+      agent$value_adam <- moved$adam
+    }
+    check_finite_weights(weights, agent)
+    agent$value <- with_weights(agent$value, weights)
+  }
   agent$log[] <- c(
     -mean(draws$entropy), if (agent$baseline) explained_variance(value, return) else NA,
     -mean(advantage * draws$log_prob), if (agent$baseline) mean((value - return)^2) else NA,
@@ -125,26 +138,9 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
   end_iteration(agent, results)
 }
 
-# Steps down the gradient of the squared error.
-fit_baseline <- function(agent, inputs, return, learning_rate) {
-  value <- agent$value
-  weights <- weight_vector(value)
-  for (update in seq_len(agent$value_updates)) {
-    forward <- forward_network(value, weights, inputs)
-    error <- forward$outputs - return
-    gradient <- backward_network(forward, 2 / length(return) * error)
-    moved <- adam_step(weights, gradient, agent$value_adam, learning_rate)
-    weights <- moved$weights
-    agent$value_adam <- moved$adam
-  }
-  check_finite_weights(weights, agent)
-  agent$value <- with_weights(value, weights)
-  agent
-}
-
 #' @export
 format.gym_agent_reinforce <- function(x, ...) {
-  gradient_text(
+  agent_text(
     if (x$baseline) "REINFORCE with baseline" else "REINFORCE",
     x[c("batch_steps", "learning_rate", "gamma")]
   )

@@ -73,7 +73,7 @@ learner_of.gym_agent_sarsa <- function(agent, draw) {
       # The chosen action is taken if the episode goes on.
       following
     },
-    taken = function() taken
+    keeps = function() list(taken = taken)
   )
 }
 

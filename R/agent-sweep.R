@@ -69,15 +69,30 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   call <- rlang::current_env()
   check_sweep(agent, settings, seeds, report_seeds, folder, call)
   settings <- as.data.frame(settings)
-  settings$setting <- setting_names(settings)
+  texts <- vapply(seq_len(nrow(settings)), function(row) {
+    values <- vapply(settings[row, , drop = FALSE], function(x) {
+      x <- x[[1L]]
+      if (length(x) == 1L && is.atomic(x)) format(x) else substr(rlang::hash(x), 1L, 8L)
+    }, "")
+    paste(names(settings), "=", values, collapse = ", ")
+  }, "")
+  settings$setting <- make.unique(texts, " ")
   dots <- list(...)
   place <- "give it as a column of `settings`, as in `data.frame(%s = )`"
   check_not_of_agent(names(dots), names(formals(agent)), place, call)
-  preset <- sweep_preset(agent, env, dots)
+  # The preset that the agent's own trainer, such as learn_ppo(), would use.
+  kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))),
+                 unique(own_presets()$agent))
+  kwargs <- dots[setdiff(names(dots), names(formals(train_agent)))]
+  preset <- if (length(kind)) find_preset(kind, env, kwargs)
   if (!is.null(preset)) inform_of_preset(preset, env)
   agents <- lapply(seq_len(nrow(settings)), function(row) {
     arguments <- lapply(settings[row, names(settings) != "setting", drop = FALSE], `[[`, 1L)
-    tryCatch(sweep_agent_of(agent, arguments, preset, names(dots)), error = identity)
+    own <- replace_arguments(preset_arguments(preset), arguments)
+    tryCatch(
+      with_preset(rlang::exec(agent, !!!own), preset, c(names(arguments), names(dots))),
+      error = identity
+    )
   })
   names(agents) <- settings$setting
   failed <- vapply(agents, inherits, NA, "condition")
@@ -126,7 +141,15 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
   if (!is.data.frame(settings) || !nrow(settings) || !length(settings)) {
     abort_argument(settings, "a data frame with a row for each setting", "settings", call)
   }
-  check_settings(names(settings), names(formals(agent)), call)
+  known <- names(formals(agent))
+  unknown <- setdiff(names(settings), known)
+  if (length(unknown) && !"..." %in% known) {
+    abort_wrong(
+      "settings", unknown, call,
+      "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
+      i = "{did_you_mean(unknown[[1L]], known)}", i = "It has {quoted_names(known)}."
+    )
+  }
   check_given(seeds, "They are the seeds for tuning, such as `1:10`.", call = call)
   check_seeds(seeds, call)
   check_string(folder, allow_null = TRUE, arg = "folder", call = call)
@@ -141,46 +164,6 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
       )
     }
   }
-}
-
-check_settings <- function(names, known, call) {
-  unknown <- setdiff(names, known)
-  if (length(unknown) && !"..." %in% known) {
-    abort_wrong(
-      "settings", unknown, call,
-      "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
-      i = "{did_you_mean(unknown[[1L]], known)}",
-      i = "It has {quoted_names(known)}."
-    )
-  }
-}
-
-setting_names <- function(settings) {
-  texts <- vapply(seq_len(nrow(settings)), function(row) {
-    values <- vapply(settings[row, , drop = FALSE], function(x) {
-      x <- x[[1L]]
-      if (length(x) == 1L && is.atomic(x)) format(x) else substr(rlang::hash(x), 1L, 8L)
-    }, "")
-    paste(names(settings), "=", values, collapse = ", ")
-  }, "")
-  make.unique(texts, " ")
-}
-
-# The preset that the agent's own trainer, such as learn_ppo(), would use.
-sweep_preset <- function(agent, env, dots) {
-  kinds <- unique(own_presets()$agent)
-  kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))), kinds)
-  if (length(kind)) {
-    find_preset(kind, env, dots[setdiff(names(dots), names(formals(train_agent)))])
-  }
-}
-
-sweep_agent_of <- function(make, arguments, preset, given) {
-  if (is.null(preset)) {
-    return(rlang::exec(make, !!!arguments))
-  }
-  agent <- rlang::exec(make, !!!replace_arguments(preset_arguments(preset), arguments))
-  with_preset(agent, preset, c(names(arguments), given))
 }
 
 #' Train agents with several seeds, all at once
@@ -238,22 +221,22 @@ sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, clien
     "Interrupted after {finished} of {total} run{?s}; what was finished is returned.",
     function() length(results), length(runs)
   )
-  sweep_results(results, runs, jobs, names(agents), proc.time()[["elapsed"]] - started, interrupted)
-}
-
-sweep_results <- function(results, runs, jobs, names, elapsed, interrupted) {
-  job <- vapply(runs[seq_along(results)], function(run) run$job, 0L)
+  elapsed <- proc.time()[["elapsed"]] - started
+  runs <- runs[seq_along(results)]
+  job <- vapply(runs, `[[`, 0L, "job")
   errors <- vapply(results, function(result) {
     if (inherits(result, "condition")) conditionMessage(result) else NA_character_
   }, "")
-  seeds <- vapply(runs[seq_along(results)], function(run) as.numeric(run$settings$seed), 0)
   trainings <- lapply(seq_along(jobs), function(at) {
     whole <- results[job == at & is.na(errors)]
     if (length(whole)) new_trainings(whole, jobs[[at]]$settings, elapsed, interrupted)
   })
   list(
-    trainings = stats::setNames(trainings, names), interrupted = interrupted,
-    runs = data.frame(setting = names[job], seed = seeds, error = errors)
+    trainings = stats::setNames(trainings, names(agents)), interrupted = interrupted,
+    runs = data.frame(
+      setting = names(agents)[job], error = errors,
+      seed = vapply(runs, function(run) as.numeric(run$settings$seed), 0)
+    )[c("setting", "seed", "error")]
   )
 }
 

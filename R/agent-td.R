@@ -37,7 +37,19 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   check_one_policy(policy, "policy", rlang::current_env())
   check_count(n)
   check_number(lambda, min = 0, max = 1)
-  if (!is.null(behavior)) check_behavior(policy, behavior, n, lambda)
+  call <- rlang::current_env()
+  # The probabilities of both must be known, and only one step ahead is weighted.
+  for (arg in if (!is.null(behavior)) c("policy", "behavior")) {
+    if (!inherits(get(arg), c("gym_policy_table", "gym_policy_random"))) {
+      must <- "a table or a random policy, whose probabilities are known"
+      abort_argument(get(arg), must, arg, call)
+    }
+  }
+  if (!is.null(behavior) && (n > 1 || lambda > 0)) {
+    abort_wrong(
+      "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
+    )
+  }
   settings <- list(
     plays = behavior %||% policy, learns = if (!is.null(behavior)) policy, discount = discount,
     learning_rate = learning_rate, initial = initial,
@@ -48,22 +60,6 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   new_learner("gym_agent_td", settings)
 }
 
-# The probabilities of both must be known, and only one step ahead is weighted.
-check_behavior <- function(policy, behavior, n, lambda, call = rlang::caller_env()) {
-  for (arg in c("policy", "behavior")) {
-    value <- get(arg)
-    if (!inherits(value, c("gym_policy_table", "gym_policy_random"))) {
-      must <- "a table or a random policy, whose probabilities are known"
-      abort_argument(value, must, arg, call)
-    }
-  }
-  if (n > 1 || lambda > 0) {
-    abort_wrong(
-      "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
-    )
-  }
-}
-
 #' @export
 agent_start.gym_agent_td <- function(agent, policy) {
   agent <- NextMethod()
@@ -71,10 +67,6 @@ agent_start.gym_agent_td <- function(agent, policy) {
   if (!is.null(agent$learns)) agent$learns <- policy_bind(agent$learns, policy)
   agent
 }
-
-# A value for each state.
-#' @exportS3Method
-value_columns_of.gym_agent_td <- function(agent) 1L
 
 #' @exportS3Method
 learner_of.gym_agent_td <- function(agent, draw) {
@@ -85,7 +77,7 @@ learner_of.gym_agent_td <- function(agent, draw) {
   )
   act <- policy_chooser(agent, probabilities, draw)
   ratio <- if (!is.null(agent$learns)) importance_ratio(agent)
-  learn <- if (is.null(ratio)) learning$learn else weighted_lookahead(agent, learning$store)
+  rate <- rate_of(agent$learning_rate)
   taken <- agent$taken
   from <- list()
   new_steps(
@@ -97,46 +89,32 @@ learner_of.gym_agent_td <- function(agent, draw) {
     observe = function(x, column, reward, after, terminated, ended, sub_env, observation) {
       ahead <- if (terminated) 0 else value(after)
       if (is.null(ratio)) {
-        learn(x, 1L, reward, ahead, ended, sub_env, taken)
+        learning$learn(x, 1L, reward, ahead, ended, sub_env, taken)
       } else {
-        learn(x, reward, ahead, ratio(from[[sub_env]], column), taken)
+        share <- ratio(from[[sub_env]], column) * rate(taken)
+        learning$store$toward(x, 1L, reward + agent$discount * ahead, share)
         from[[sub_env]] <<- observation
       }
       taken <<- taken + 1
       if (ended) NA_integer_ else act(after, sub_env, observation)
     },
-    taken = function() taken, sees = !is.null(ratio) || is.null(probabilities)
+    keeps = function() list(taken = taken), sees = !is.null(ratio) || is.null(probabilities)
   )
 }
 
 # How much more likely `policy` takes an action than the policy that plays: a function of an
 # observation (a batch of one) and the number of an action.
 importance_ratio <- function(agent) {
-  space <- agent$spaces$observation_space
-  index <- table_index(space, "observations", NULL)$index
-  target <- state_probabilities(agent$learns, agent$spaces$action_space)
-  plays <- state_probabilities(agent$plays, agent$spaces$action_space)
+  index <- table_index(agent$spaces$observation_space, "observations", NULL)$index
+  target <- chooser_probabilities(agent$learns, agent$spaces$action_space, by_state = TRUE)
+  plays <- chooser_probabilities(agent$plays, agent$spaces$action_space, by_state = TRUE)
+  share <- function(p, row, column) {
+    if (is.matrix(p)) p <- p[row, ]
+    p[[column]] / sum(p)
+  }
   function(observation, column) {
     row <- index(observation, 1L)
-    target(row, column) / plays(row, column)
-  }
-}
-
-state_probabilities <- function(policy, action_space) {
-  probabilities <- chooser_probabilities(policy, action_space, by_state = TRUE)
-  if (is.matrix(probabilities)) {
-    sums <- rowSums(probabilities)
-    function(row, column) probabilities[[row, column]] / sums[[row]]
-  } else {
-    function(row, column) probabilities[[column]] / sum(probabilities)
-  }
-}
-
-weighted_lookahead <- function(agent, store) {
-  rate <- rate_of(agent$learning_rate)
-  discount <- agent$discount
-  function(x, reward, ahead, ratio, taken) {
-    store$toward(x, 1L, reward + discount * ahead, ratio * rate(taken))
+    share(target, row, column) / share(plays, row, column)
   }
 }
 
@@ -146,14 +124,13 @@ weighted_lookahead <- function(agent, store) {
 #' policy is asked; with several sub-environments it was asked about all of them together.
 #' @noRd
 policy_chooser <- function(agent, probabilities, draw) {
-  if (is.null(probabilities)) {
-    policy <- agent$plays
-    first <- agent$spaces$action_space$start - 1L
-    function(x, sub_env, observation) act_batch(policy, observation, 1L, agent$spaces) - first
-  } else if (is.matrix(probabilities)) {
-    function(x, sub_env, observation) draw_place(probabilities[x, ], draw())
-  } else {
-    function(x, sub_env, observation) draw_place(probabilities, draw())
+  first <- agent$spaces$action_space$start - 1L
+  function(x, sub_env, observation) {
+    if (is.null(probabilities)) {
+      act_batch(agent$plays, observation, 1L, agent$spaces) - first
+    } else {
+      draw_place(if (is.matrix(probabilities)) probabilities[x, ] else probabilities, draw())
+    }
   }
 }
 

@@ -87,37 +87,35 @@ trace_lookahead <- function(agent, store, rate) {
 
 # Sutton and Barto 2018, sections 7.1 and 7.2.
 n_step_lookahead <- function(agent, store, rate) {
-  recent_of <- for_each_sub_env(function() new_recent_steps(agent, store))
-  function(x, column, reward, ahead, ended, sub_env, taken) {
-    recent_of(sub_env)(x, column, reward, ahead, ended, rate(taken))
-  }
-}
-
-new_recent_steps <- function(agent, store) {
   n <- agent$n
   discount <- agent$discount
   powers <- discount^(seq_len(n) - 1L)
-  seen <- list()
-  columns <- integer()
-  rewards <- numeric()
-  learn_first <- function(ahead, rate) {
-    count <- length(rewards)
-    target <- sum(powers[seq_len(count)] * rewards) + discount^count * ahead
-    store$toward(seen[[1L]], columns[[1L]], target, rate)
-    seen <<- seen[-1L]
-    columns <<- columns[-1L]
-    rewards <<- rewards[-1L]
-  }
-  function(x, column, reward, ahead, ended, rate) {
-    count <- length(rewards) + 1L
-    seen[[count]] <<- x
-    columns[[count]] <<- column
-    rewards[[count]] <<- reward
-    if (ended) {
-      # At the end of an episode all remaining steps have their targets.
-      while (length(rewards)) learn_first(ahead, rate)
-    } else if (count == n) {
-      learn_first(ahead, rate)
+  learner_of_one <- for_each_sub_env(function() {
+    seen <- list()
+    columns <- integer()
+    rewards <- numeric()
+    learn_first <- function(ahead, rate) {
+      count <- length(rewards)
+      target <- sum(powers[seq_len(count)] * rewards) + discount^count * ahead
+      store$toward(seen[[1L]], columns[[1L]], target, rate)
+      seen <<- seen[-1L]
+      columns <<- columns[-1L]
+      rewards <<- rewards[-1L]
     }
+    function(x, column, reward, ahead, ended, rate) {
+      count <- length(rewards) + 1L
+      seen[[count]] <<- x
+      columns[[count]] <<- column
+      rewards[[count]] <<- reward
+      if (ended) {
+        # At the end of an episode all remaining steps have their targets.
+        while (length(rewards)) learn_first(ahead, rate)
+      } else if (count == n) {
+        learn_first(ahead, rate)
+      }
+    }
+  })
+  function(x, column, reward, ahead, ended, sub_env, taken) {
+    learner_of_one(sub_env)(x, column, reward, ahead, ended, rate(taken))
   }
 }

@@ -24,8 +24,14 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   if (is.null(settings$temperature) && !isTRUE(settings$exploring_starts)) {
     check_explores(settings$epsilon, call)
   }
-  check_initial(settings, call)
   features <- settings$features
+  initial <- plain_numbers(settings$initial, "initial", call)
+  # With a function as `features` it may be a number for each feature.
+  if (!is.function(features) || length(initial) <= 1L) {
+    check_number(initial, arg = "initial", call = call)
+  } else if (!is.numeric(initial) || !all(is.finite(initial))) {
+    abort_argument(initial, "finite numbers", "initial", call)
+  }
   if (!is.null(features) && !is.function(features) && !inherits(features, "gym_features")) {
     must <- "NULL, what `tile_coding()` makes, or a function of observations"
     abort_argument(features, must, "features", call)
@@ -36,44 +42,38 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
 }
 
-# With a function as `features` it may be a number for each feature.
-check_initial <- function(settings, call) {
-  initial <- plain_numbers(settings$initial, "initial", call)
-  several <- is.function(settings$features) && length(initial) > 1L
-  if (several && !(is.numeric(initial) && all(is.finite(initial)))) {
-    abort_argument(initial, "finite numbers", "initial", call)
-  }
-  if (!several) check_number(initial, arg = "initial", call = call)
-}
-
 # Beginning ---------------------------------------------------------------------------
 
 #' @export
 agent_start.gym_value_learner <- function(agent, policy) {
-  call <- NULL
   if (!inherits(policy$action_space, "gym_space_discrete")) {
     abort_wrong(
-      "env", NULL, call,
+      "env", NULL, NULL,
       "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
       i = "`search_ars()` and `search_cem()` learn actions of a Box."
     )
   }
   agent$spaces <- policy[c("observation_space", "action_space")]
-  agent$basis <- basis_of(agent$features, policy$observation_space, call)
+  agent$basis <- basis_of(agent$features, policy$observation_space, NULL)
   agent$taken <- 0
   agent["weights"] <- list(first_weights(agent, policy))
   agent
 }
 
-# The number of columns of the weights: one for each action by default.
-value_columns_of <- function(agent) UseMethod("value_columns_of")
-
-#' @exportS3Method
-value_columns_of.default <- function(agent) as.integer(agent$spaces$action_space$n)
+# The number of columns of the weights: one for each action, or one for the values of states.
+value_columns_of <- function(agent) {
+  of_states <- inherits(agent, c("gym_agent_td", "gym_agent_actor_critic"))
+  if (of_states) 1L else as.integer(agent$spaces$action_space$n)
+}
 
 first_weights <- function(agent, policy) {
   if (!is.null(policy$q)) {
-    check_first_table(agent, policy)
+    if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
+      abort_wrong(
+        "policy", policy, NULL,
+        "Only a learner of a table with a column for each action can start with a table."
+      )
+    }
     weights <- policy$q
   } else if (is.na(agent$basis$count)) {
     # The user's function has not been called yet.
@@ -96,15 +96,6 @@ first_weights <- function(agent, policy) {
   weights
 }
 
-check_first_table <- function(agent, policy) {
-  if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
-    abort_wrong(
-      "policy", policy, NULL,
-      "Only a learner of a table with a column for each action can start with a table."
-    )
-  }
-}
-
 # Learning ----------------------------------------------------------------------------
 
 #' Make the functions that all learners of values share
@@ -122,18 +113,18 @@ learning_of <- function(agent, draw) {
 #' Make a learner from the functions of its steps
 #' @param learning As [learning_of()] makes it.
 #' @param act,observe,sees The learner's own, as [learner_of()] describes them.
-#' @param taken A function that returns the number of steps so far.
-#' @param export A function that adds the learner's own elements to the agent.
+#' @param keeps A function that returns what the agent keeps besides its weights, a list with names:
+#'   the number of steps so far, `taken`, and the learner's own elements.
 #' @param stores All its tables; the first one has the values of the actions.
 #' @noRd
-new_steps <- function(agent, learning, act, observe, taken, export = identity,
-                      stores = list(learning$store), sees = FALSE) {
+new_steps <- function(agent, learning, act, observe, keeps, stores = list(learning$store),
+                      sees = FALSE) {
   list(
     act = act, observe = observe, stores = stores, sees = sees,
     export = function() {
-      agent["weights"] <- list(learning$store$get())
-      agent$taken <- taken()
-      export(agent)
+      kept <- c(list(weights = learning$store$get()), keeps())
+      agent[names(kept)] <- kept
+      agent
     }
   )
 }
@@ -188,7 +179,10 @@ value_store <- function(basis, weights, initial, columns) {
 feature_store <- function(weights, initial, columns) {
   known <- function(x) {
     if (is.null(weights)) {
-      check_first_weights(initial, length(x))
+      if (!length(initial) %in% c(1L, length(x))) {
+        must <- paste("one number, or one for each of", count_of(length(x), "feature"))
+        abort_argument(initial, must, "initial", NULL)
+      }
       weights <<- matrix(as.double(initial), length(x), columns)
     } else if (length(x) != nrow(weights)) {
       abort_wrong(
@@ -217,13 +211,6 @@ feature_store <- function(weights, initial, columns) {
   )
 }
 
-check_first_weights <- function(initial, count) {
-  if (!length(initial) %in% c(1L, count)) {
-    must <- paste("one number, or one for each of", count_of(count, "feature"))
-    abort_argument(initial, must, "initial", NULL)
-  }
-}
-
 #' Make the function by which a learner chooses an action
 #'
 #' It draws among equal values, so that a new learner explores everything.
@@ -250,21 +237,19 @@ action_chooser <- function(agent, draw) {
       actions[values > -Inf]
     } else {
       best <- max(values)
-      if (is.na(best)) abort_diverged()
+      if (is.na(best)) {
+        gym_abort(
+          c("The learned values have become infinite.",
+            i = "Use a smaller `learning_rate`, or other `features`."),
+          class = "gym_error_agent", call = NULL
+        )
+      }
       actions[values == best]
     }
     count <- length(from)
     # As draw_place() where all weigh the same, and twice as fast.
     if (count == 1L) from else from[[as.integer(draw() * count) + 1L]]
   }
-}
-
-abort_diverged <- function() {
-  gym_abort(
-    c("The learned values have become infinite.",
-      i = "Use a smaller `learning_rate`, or other `features`."),
-    class = "gym_error_agent", call = NULL
-  )
 }
 
 # Draws a place with a probability proportional to its weight; `u` is a random number from 0 to 1.
@@ -336,7 +321,11 @@ state_values <- function(x, actions = FALSE) {
     must <- "the result of a learner of a table, such as `learn_q()`"
     abort_argument(x, must, "x", rlang::current_env())
   }
-  q <- value_table(agent)
+  q <- action_weights(agent)
+  if (!is.null(agent$features)) {
+    states <- state_numbers(space)
+    q <- linear_values(agent$basis, q, agent$basis$of(states, length(states)))
+  }
   if (actions) {
     states <- all_values(space)
     row <- rep(seq_len(nrow(q)), each = ncol(q))
@@ -360,20 +349,10 @@ state_values <- function(x, actions = FALSE) {
   }
 }
 
-value_table <- function(agent) {
-  weights <- action_weights(agent)
-  if (is.null(agent$features)) {
-    return(weights)
-  }
-  states <- state_numbers(agent$spaces$observation_space)
-  linear_values(agent$basis, weights, agent$basis$of(states, length(states)))
+# The table of values of the greedy policy. Double Q-learning has two tables.
+action_weights <- function(agent) {
+  if (is.null(agent$second)) agent$weights else (agent$weights + agent$second) / 2
 }
-
-# The table of values of the greedy policy.
-action_weights <- function(agent) UseMethod("action_weights")
-
-#' @exportS3Method
-action_weights.default <- function(agent) agent$weights
 
 learner_text <- function(name, agent, settings = NULL) {
   texts <- c(

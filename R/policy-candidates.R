@@ -26,12 +26,7 @@ policy_candidates <- function(policy, weights) {
   }
   check_network(policy)
   weights <- plain_numbers(weights)
-  check_candidate_weights(weights, count_weights(policy))
-  storage.mode(weights) <- "double"
-  new_candidates(policy, weights)
-}
-
-check_candidate_weights <- function(weights, count, call = rlang::caller_env()) {
+  call <- rlang::current_env()
   if (!is.matrix(weights) || !is.numeric(weights) || !nrow(weights)) {
     single <- is.numeric(weights) && is.null(dim(weights))
     abort_wrong(
@@ -41,18 +36,20 @@ check_candidate_weights <- function(weights, count, call = rlang::caller_env()) 
       i = if (single) "For a single candidate this is `rbind(weights)`."
     )
   }
+  count <- count_weights(policy)
   if (ncol(weights) != count) {
-    turned <- nrow(weights) == count
     abort_wrong(
       "weights", weights, call,
       '`weights` must have the {count_of(count, "weight")} of a candidate in each row, one a
        column, not {count_of(ncol(weights), "column")}.',
-      i = if (turned) "`t(weights)` has a candidate in each row."
+      i = if (nrow(weights) == count) "`t(weights)` has a candidate in each row."
     )
   }
   if (anyNA(weights)) {
     abort_argument(weights, "without missing values", "weights", call)
   }
+  storage.mode(weights) <- "double"
+  new_candidates(policy, weights)
 }
 
 #' @export

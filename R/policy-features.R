@@ -78,25 +78,23 @@ basis_of <- function(features, space, call) {
     return(list(count = index$count, each = 1L, of = of, one = row, features = NULL))
   }
   if (is.function(features)) {
-    of <- function(observation, n) check_features(features(observation), n, call)
+    of <- function(observation, n) {
+      values <- plain_numbers(features(observation), "features", call)
+      if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) ||
+            nrow(values) != n || !all(is.finite(values))) {
+        abort_wrong(
+          "features", values, call,
+          '`features` must return a numeric matrix with a row for each of
+           {count_of(n, "observation")}, not {describe_argument(values)}.',
+          i = "It gets many observations at once, as a policy does; see `act()`."
+        )
+      }
+      values
+    }
     one <- function(observation) of(observation, 1L)[1L, ]
     return(list(count = NA, each = NULL, of = of, one = one, features = features))
   }
   tiles_of(features, space, call)
-}
-
-check_features <- function(values, n, call) {
-  values <- plain_numbers(values, "features", call)
-  if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) || nrow(values) != n ||
-        !all(is.finite(values))) {
-    abort_wrong(
-      "features", values, call,
-      '`features` must return a numeric matrix with a row for each of
-       {count_of(n, "observation")}, not {describe_argument(values)}.',
-      i = "It gets many observations at once, as a policy does; see `act()`."
-    )
-  }
-  values
 }
 
 tiles_of <- function(features, space, call) {

@@ -47,31 +47,18 @@
 #'
 #' evaluate_policy("CartPole-v1", pid, episodes = 20, seed = 1)
 policy_memory <- function(act, initial) {
-  check_takes_memory(act, rlang::current_env())
-  check_given(initial, "It is the memory at the start of an episode, such as `c(sum = 0)`.")
-  structure(
-    list(act = act, initial = initial_memory(initial, rlang::current_env())),
-    class = c("gym_policy_memory", "gym_policy")
-  )
-}
-
-check_takes_memory <- function(act, call) {
+  call <- rlang::current_env()
   must <- "a function of `observation` and `memory`"
   if (!is.function(act)) {
     abort_argument(act, must, "act", call)
   }
   takes <- names(formals(args(act)))
   if (!"..." %in% takes && length(takes) < 2L) {
-    abort_wrong(
-      "act", act, call,
-      '`act` must be {must}, not of
-       {if (length(takes)) paste0("`", takes, "` alone") else "nothing"}.'
-    )
+    alone <- if (length(takes)) paste0("`", takes, "` alone") else "nothing"
+    abort_wrong("act", act, call, "`act` must be {must}, not of {alone}.")
   }
-}
-
-# A matrix or a data frame of one row.
-initial_memory <- function(initial, call) {
+  check_given(initial, "It is the memory at the start of an episode, such as `c(sum = 0)`.")
+  # A matrix or a data frame of one row.
   memory <- if (is.list(initial)) {
     tryCatch(
       as.data.frame(initial, stringsAsFactors = FALSE, optional = TRUE),
@@ -83,12 +70,10 @@ initial_memory <- function(initial, call) {
     initial
   }
   if (!length(memory) || !identical(nrow(memory), 1L)) {
-    abort_argument(
-      initial, "the memory of one episode: a vector, or a list or data frame of one row", "initial",
-      call
-    )
+    must <- "the memory of one episode: a vector, or a list or data frame of one row"
+    abort_argument(initial, must, "initial", call)
   }
-  memory
+  structure(list(act = act, initial = memory), class = c("gym_policy_memory", "gym_policy"))
 }
 
 #' @export

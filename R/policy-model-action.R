@@ -7,7 +7,12 @@ model_actions <- function(policy, columns, call) {
   predicted <- model_predictions(policy, columns, call)
   discrete <- inherits(space, "gym_space_discrete")
   if (discrete && inherits(policy$model, "nnet") && NCOL(predicted) == space$n && space$n > 1) {
-    predicted <- largest_output(policy, predicted, call)
+    # Several columns of nnet() are outputs to compare.
+    if (anyNA(predicted)) {
+      abort_no_action(policy, NA, call)
+    }
+    labels <- colnames(predicted) %||% (space$start + seq_len(space$n) - 1L)
+    predicted <- labels[max.col(predicted, ties.method = "first")]
   }
   # The columns of a model have names from the table of steps, or of its formula.
   predicted <- action_by_name(space, predicted, NULL, call)
@@ -43,16 +48,6 @@ check_predictions <- function(policy, predicted, n, width, call) {
     problem <- paste(must, NROW(predicted), "for", count_of(n, "observation"))
     abort_prediction(policy, problem, hint, call)
   }
-}
-
-# Several columns of nnet() are outputs to compare.
-largest_output <- function(policy, outputs, call) {
-  space <- policy$action_space
-  if (anyNA(outputs)) {
-    abort_no_action(policy, NA, call)
-  }
-  labels <- colnames(outputs) %||% (space$start + seq_len(space$n) - 1L)
-  labels[max.col(outputs, ties.method = "first")]
 }
 
 # Discrete actions from labels or the nearest numbers; NA for a label without an action.

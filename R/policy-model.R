@@ -78,7 +78,31 @@ as_policy.default <- function(x, ..., predict = NULL) {
     check_dots_empty(...)
     return(x)
   }
-  new_model_policy(x, list(...), predict)
+  call <- rlang::current_env()
+  arguments <- list(...)
+  known <- if (is.null(predict)) model_defaults(x, arguments$type, call)
+  if (is.null(predict) && is.null(known)) {
+    abort_wrong(
+      "x", x, call,
+      "`x` must be a policy, a function of observations or a model of `lm()`, `glm()`,
+       `rpart::rpart()` or `nnet::nnet()`, not {describe_argument(x)}.",
+      i = if (is.object(x)) {
+        "For another model, give `predict = function(model, newdata) ...`, which returns actions."
+      }
+    )
+  }
+  if (!is.null(predict) && !is.function(predict)) {
+    abort_argument(predict, "a function of the model and a data frame", "predict", call)
+  }
+  check_dots_named(arguments, "type = \"response\"", call)
+  arguments$type <- arguments$type %||% known$type
+  structure(
+    list(
+      model = x, predict = predict, arguments = arguments, labels = known$labels,
+      package = known$package, observation_space = NULL, action_space = NULL, env_id = NULL
+    ),
+    class = c("gym_policy_model", "gym_policy")
+  )
 }
 
 #' @export
@@ -103,26 +127,6 @@ as_policy.gym_training <- function(x, ...) {
 #' @export
 as_policy.gym_rollout <- as_policy.gym_training
 
-#' Make a policy from a model
-#' @param predict A function for predictions, or `NULL` for a model that is known.
-#' @noRd
-new_model_policy <- function(model, arguments, predict, call = rlang::caller_env()) {
-  known <- if (is.null(predict)) model_defaults(model, arguments$type, call)
-  if (is.null(predict) && is.null(known)) abort_no_model(model, call)
-  if (!is.null(predict) && !is.function(predict)) {
-    abort_argument(predict, "a function of the model and a data frame", "predict", call)
-  }
-  check_dots_named(arguments, "type = \"response\"", call)
-  arguments$type <- arguments$type %||% known$type
-  structure(
-    list(
-      model = model, predict = predict, arguments = arguments, labels = known$labels,
-      package = known$package, observation_space = NULL, action_space = NULL, env_id = NULL
-    ),
-    class = c("gym_policy_model", "gym_policy")
-  )
-}
-
 #' Find out how a model of a known class predicts actions
 #' @param type The user's `type` of predictions, `NULL` for the default.
 #' @return A list: `type`; `package`, which has the method of predict(); `labels`, the two levels
@@ -131,7 +135,16 @@ new_model_policy <- function(model, arguments, predict, call = rlang::caller_env
 model_defaults <- function(model, type, call) {
   if (inherits(model, "glm")) {
     type <- type %||% "response"
-    labels <- binomial_levels(model, call)
+    labels <- if (identical(model$family$family, "binomial")) {
+      levels(stats::model.frame(model)[[1L]])
+    }
+    if (length(labels) > 2L) {
+      abort_wrong(
+        "x", model, call,
+        "A binomial model tells two actions apart, but its response has {length(labels)} levels.",
+        i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."
+      )
+    }
     list(type = type, labels = if (type == "response") labels)
   } else if (inherits(model, "lm")) {
     list(type = type)
@@ -143,41 +156,11 @@ model_defaults <- function(model, type, call) {
   }
 }
 
-binomial_levels <- function(model, call) {
-  labels <- if (identical(model$family$family, "binomial")) {
-    levels(stats::model.frame(model)[[1L]])
-  }
-  if (length(labels) > 2L) {
-    abort_wrong(
-      "x", model, call,
-      "A binomial model tells two actions apart, but its response has {length(labels)} levels.",
-      i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."
-    )
-  }
-  labels
-}
-
-abort_no_model <- function(x, call) {
-  abort_wrong(
-    "x", x, call,
-    "`x` must be a policy, a function of observations or a model of `lm()`, `glm()`,
-     `rpart::rpart()` or `nnet::nnet()`, not {describe_argument(x)}.",
-    i = if (is.object(x)) {
-      "For another model, give `predict = function(model, newdata) ...`, which returns actions."
-    }
-  )
-}
-
 #' @export
 format.gym_policy_model <- function(x, ...) {
   formula <- tryCatch(stats::formula(x$model), error = function(cnd) NULL)
-  if (inherits(formula, "formula")) {
-    # Drop the environment, which would be printed, too.
-    attributes(formula) <- NULL
-    text <- describe_value(formula)
-  } else {
-    text <- NULL
-  }
+  # Without its environment, which would be printed, too.
+  text <- if (inherits(formula, "formula")) describe_value(`attributes<-`(formula, NULL))
   paste(c(paste(class(x$model)[[1L]], "model"), text), collapse = ", ")
 }
 

@@ -2,7 +2,11 @@
 
 network_action <- function(space, outputs, policy, one) {
   if (is_gaussian(policy)) {
-    return(drawn_numbers(space, outputs, policy, one))
+    # They are cut at the bounds when the step is taken. Candidates have a row of deviations each.
+    deviation <- exp(policy$log_std)
+    if (is.null(dim(deviation))) deviation <- rep(deviation, each = nrow(outputs))
+    values <- outputs + deviation * stats::rnorm(length(outputs))
+    return(numbers_in_shape(values, space, one))
   }
   if (inherits(space, "gym_space_box")) {
     box_action(space, outputs, policy, one)
@@ -33,15 +37,6 @@ explore <- function(chosen, epsilon, n) {
   explores <- stats::runif(length(chosen)) < epsilon
   chosen[explores] <- sample.int(n, sum(explores), replace = TRUE) - 1L
   chosen
-}
-
-# Draws numbers around the outputs. They are cut at the bounds when the step is taken.
-drawn_numbers <- function(space, outputs, policy, one) {
-  # Candidates have a row each.
-  deviation <- exp(policy$log_std)
-  if (is.null(dim(deviation))) deviation <- rep(deviation, each = nrow(outputs))
-  values <- outputs + deviation * stats::rnorm(length(outputs))
-  numbers_in_shape(values, space, one)
 }
 
 numbers_in_shape <- function(values, space, one) {

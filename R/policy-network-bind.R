@@ -59,7 +59,8 @@ check_inputs <- function(policy, env, call) {
   if (is.null(gives)) {
     abort_fit(policy, paste("A network cannot observe", format(space)), env, call)
   }
-  if (!is.null(policy$moments) && inherits(space, "gym_space_discrete")) {
+  discrete <- inherits(space, "gym_space_discrete")
+  if (!is.null(policy$moments) && discrete) {
     abort_wrong(
       "policy", policy, call,
       "Observations that are numbers of a range can be normalized, but those of
@@ -68,15 +69,13 @@ check_inputs <- function(policy, env, call) {
     )
   }
   if (gives != inputs) {
-    problem <- paste0(
-      "The network takes ", count_of(inputs, "input"), ", but an observation of ",
-      environment_label(env),
-      if (inherits(space, "gym_space_discrete")) {
-        paste0(" is one of ", gives, " and needs an input for each")
-      } else {
-        paste0(" has ", count_of(gives, "number"))
-      }
-    )
+    of_each <- if (discrete) {
+      paste("is one of", gives, "and needs an input for each")
+    } else {
+      paste("has", count_of(gives, "number"))
+    }
+    problem <- paste0("The network takes ", count_of(inputs, "input"), ", but an observation of ",
+                      environment_label(env), " ", of_each)
     abort_fit(policy, problem, env, call)
   }
 }
@@ -89,7 +88,7 @@ check_outputs <- function(policy, env, call) {
     abort_fit(policy, paste("A network cannot choose from", format(space)), env, call)
   }
   discrete <- inherits(space, "gym_space_discrete")
-  check_output_fits(policy, env, call)
+  check_output_kind(policy, space, env, call)
   rounded <- discrete && outputs == 1L && width == 2 && policy$output != "softmax"
   if (outputs != width && !rounded) {
     takes <- if (discrete) "has" else "takes an action of"
@@ -99,13 +98,9 @@ check_outputs <- function(policy, env, call) {
     )
     abort_fit(policy, problem, env, call)
   }
-  if (!discrete && has_range(policy)) {
-    check_bounded(policy, env, call)
-  }
 }
 
-check_output_fits <- function(policy, env, call) {
-  space <- env$action_space
+check_output_kind <- function(policy, space, env, call) {
   discrete <- inherits(space, "gym_space_discrete")
   fits <- switch(policy$output,
     greedy = TRUE,
@@ -123,11 +118,8 @@ check_output_fits <- function(policy, env, call) {
       }
     )
   }
-}
-
-check_bounded <- function(policy, env, call) {
-  space <- env$action_space
-  if (!all(is.finite(c(space$low, space$high)))) {
+  bounded <- discrete || all(is.finite(c(space$low, space$high)))
+  if (!bounded && has_range(policy)) {
     abort_wrong(
       "policy", policy, call,
       'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
@@ -137,23 +129,15 @@ check_bounded <- function(policy, env, call) {
   }
 }
 
+# Names the sizes that would fit, with the same hidden layers.
 abort_fit <- function(policy, problem, env, call) {
-  abort_wrong(
-    "policy", policy, call, "{problem}.",
-    i = "{fitting_sizes(policy, env)}"
-  )
-}
-
-# The sizes that would fit, with the same hidden layers.
-fitting_sizes <- function(policy, env) {
   inputs <- space_width(env$observation_space)
   outputs <- outputs_for(env$action_space, policy$output)
-  if (is.null(inputs) || is.null(outputs)) {
-    return(NULL)
-  }
-  hidden <- policy$sizes[-c(1L, length(policy$sizes))]
-  sizes <- paste(c(inputs, hidden, outputs), collapse = ", ")
-  paste0("`policy_network(sizes = c(", sizes, "))` would fit.")
+  sizes <- toString(c(inputs, policy$sizes[-c(1L, length(policy$sizes))], outputs))
+  abort_wrong(
+    "policy", policy, call, "{problem}.",
+    i = if (length(inputs) && length(outputs)) "`policy_network(sizes = c({sizes}))` would fit."
+  )
 }
 
 # The number of outputs for actions of this space: a single one chooses between two, unless each

@@ -118,18 +118,37 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   output <- check_output(output)
   last <- if (identical(output, "greedy")) "logistic" else "identity"
   activation <- layer_activations(activation %||% c("tanh", last), sizes)
-  check_draws_from_sums(output, activation)
+  last <- activation[[length(activation)]]
+  if (!identical(output, "greedy") && last != "identity") {
+    abort_wrong(
+      "activation", activation, rlang::current_env(),
+      'A network that draws its actions needs outputs of "identity", not of "{last}".',
+      i = '`activation = c("tanh", "identity")` has them.'
+    )
+  }
   check_number(epsilon, min = 0, max = 1)
   policy <- new_network(sizes, activation, bias, normalize)
   policy$clip_obs <- clip_obs
   policy$output <- output
-  policy$log_std <- check_log_std(log_std)
+  log_std <- plain_numbers(log_std)
+  if (!is.numeric(log_std) || !length(log_std) || !all(is.finite(log_std))) {
+    must <- "a finite number, or one for each output"
+    abort_argument(log_std, must, "log_std", rlang::current_env())
+  }
+  policy$log_std <- as.numeric(log_std)
   policy$epsilon <- epsilon
   policy$init <- check_choice(init, c("uniform", "orthogonal"))
   if (!anyNA(sizes)) policy <- with_deviations(policy)
   weights <- plain_numbers(weights)
   if (!is.null(weights)) {
-    check_weights_fit(weights, policy)
+    if (anyNA(sizes)) {
+      abort_wrong(
+        "sizes", sizes, rlang::current_env(),
+        "`weights` are for given sizes, and `sizes` leaves some to the environment.",
+        i = "Give all sizes as numbers."
+      )
+    }
+    check_weights(weights, sizes, bias)
     policy$weights <- weights
     policy
   } else {
@@ -158,41 +177,11 @@ new_network <- function(sizes, activation, bias, normalize) {
   )
 }
 
-check_weights_fit <- function(weights, policy, call = rlang::caller_env()) {
-  if (anyNA(policy$sizes)) {
-    abort_wrong(
-      "sizes", policy$sizes, call,
-      "`weights` are for given sizes, and `sizes` leaves some to the environment.",
-      i = "Give all sizes as numbers."
-    )
-  }
-  check_weights(weights, policy$sizes, policy$bias, call = call)
-}
-
 check_output <- function(output, call = rlang::caller_env()) {
   if (length(output) == 1L && is.na(output)) {
     return(NA_character_)
   }
   check_choice(output, c("greedy", "softmax", "gaussian", "epsilon-greedy"), "output", call)
-}
-
-check_draws_from_sums <- function(output, activation, call = rlang::caller_env()) {
-  last <- activation[[length(activation)]]
-  if (!identical(output, "greedy") && last != "identity") {
-    abort_wrong(
-      "activation", activation, call,
-      'A network that draws its actions needs outputs of "identity", not of "{last}".',
-      i = '`activation = c("tanh", "identity")` has them.'
-    )
-  }
-}
-
-check_log_std <- function(log_std, call = rlang::caller_env()) {
-  log_std <- plain_numbers(log_std, "log_std", call)
-  if (!is.numeric(log_std) || !length(log_std) || !all(is.finite(log_std))) {
-    abort_argument(log_std, "a finite number, or one for each output", "log_std", call)
-  }
-  as.numeric(log_std)
 }
 
 # One standard deviation for each output.
@@ -240,16 +229,10 @@ network_rows <- function(policy, observation, arg, call) {
 }
 
 rows_action <- function(policy, rows, draw, call) {
-  if (is.null(policy$action_space)) inform_unbound(policy)
-  if (!draw) policy <- greedy_policy(policy)
-  outputs <- network_outputs(policy, rows$values, call)
-  network_action(policy$action_space, outputs, policy, rows$one)
-}
-
-# Without a Box its outputs choose one of several actions. Those of "logistic", the default, are for
-# that; others may be meant as the numbers of a Box.
-inform_unbound <- function(policy) {
-  if (policy$output %in% c("greedy", NA) && output_activation(policy) != "logistic") {
+  # Without a Box its outputs choose one of several actions. Those of "logistic", the default, are
+  # for that; others may be meant as the numbers of a Box.
+  if (is.null(policy$action_space) && policy$output %in% c("greedy", NA) &&
+        output_activation(policy) != "logistic") {
     last <- max(policy$sizes[[length(policy$sizes)]], 2L) - 1L
     rlang::inform(
       c(paste0("The network knows no environment and takes actions from 0 to ", last, "."),
@@ -257,6 +240,9 @@ inform_unbound <- function(policy) {
       class = "gym_message_unbound", .frequency = "once", .frequency_id = "gym_unbound"
     )
   }
+  if (!draw) policy <- greedy_policy(policy)
+  outputs <- network_outputs(policy, rows$values, call)
+  network_action(policy$action_space, outputs, policy, rows$one)
 }
 
 #' @exportS3Method
@@ -305,24 +291,20 @@ network_outputs <- function(policy, values, call = rlang::caller_env()) {
 # The input of a layer: with a bias, the constant 1 is added.
 with_bias <- function(signal, policy) if (isTRUE(policy$bias)) cbind(signal, 1) else signal
 
-abort_observation <- function(policy, values, call) {
-  given <- if (is.numeric(values)) {
-    paste("has", count_of(ncol(values), "number"))
-  } else {
-    paste("is of type", typeof(values))
-  }
-  abort_wrong(
-    "observation", values, call,
-    'The network takes {count_of(policy$sizes[[1L]], "input")}, but the observation {given}.'
-  )
-}
-
 network_inputs <- function(policy, values, call = rlang::caller_env()) {
   values <- plain_numbers(values, "observation", call)
   space <- policy$observation_space
   if (!inherits(space, "gym_space_discrete")) {
     if (ncol(values) != policy$sizes[[1L]] || !is.numeric(values)) {
-      abort_observation(policy, values, call)
+      given <- if (is.numeric(values)) {
+        paste("has", count_of(ncol(values), "number"))
+      } else {
+        paste("is of type", typeof(values))
+      }
+      abort_wrong(
+        "observation", values, call,
+        'The network takes {count_of(policy$sizes[[1L]], "input")}, but the observation {given}.'
+      )
     }
     return(normalized(values, policy$moments, policy$clip_obs))
   }

@@ -17,7 +17,13 @@ observation_rows <- function(observation, space, n = NULL, arg = "observation",
   # The number of dimensions of an observation: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
   observation <- numbers_by_name(observation, space, n, arg, call)
-  check_rows(observation, rank, space, arg, call)
+  if (is.null(observation)) {
+    abort_argument(observation, "an observation", arg, call)
+  }
+  if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
+    must <- paste("one value of", format(space), "in each row instead of several")
+    abort_argument(observation, must, arg, call)
+  }
   if (is.data.frame(observation)) {
     return(list(values = unname(frame_rows(observation)), one = FALSE))
   }
@@ -33,16 +39,6 @@ observation_rows <- function(observation, space, n = NULL, arg = "observation",
   } else {
     values <- matrix(row_major(observation), prod(axes[-1L]), axes[[1L]])
     list(values = t(values), one = FALSE)
-  }
-}
-
-check_rows <- function(observation, rank, space, arg, call) {
-  if (is.null(observation)) {
-    abort_argument(observation, "an observation", arg, call)
-  }
-  if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
-    must <- paste("one value of", format(space), "in each row instead of several")
-    abort_argument(observation, must, arg, call)
   }
 }
 

@@ -83,7 +83,16 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
     # A terminal state has no actions; the policy does nothing there.
     count <- if (!is.null(env$possible)) rowSums(env$possible)
     policy$possible <- if (any(count > 0 & count < ncol(env$possible))) env$possible
-  } else if (!space_within(own, env$action_space)) {
+    return(policy)
+  }
+  # Each of its actions must be one of the environment's, by their kinds and shapes.
+  all <- env$action_space
+  within <- if (inherits(own, "gym_space_discrete") && inherits(all, "gym_space_discrete")) {
+    own$start >= all$start && own$start + own$n <= all$start + all$n
+  } else {
+    identical(class(own), class(all)) && identical(own$shape, all$shape)
+  }
+  if (!within) {
     abort_wrong(
       "policy", policy, call,
       "The policy's actions are {format(own)}, but {environment_label(env)} takes
@@ -91,15 +100,6 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
     )
   }
   policy
-}
-
-# Whether each value of one space is a value of the other, by their kinds and shapes.
-space_within <- function(inner, outer) {
-  if (inherits(inner, "gym_space_discrete") && inherits(outer, "gym_space_discrete")) {
-    inner$start >= outer$start && inner$start + inner$n <= outer$start + outer$n
-  } else {
-    identical(class(inner), class(outer)) && identical(inner$shape, outer$shape)
-  }
 }
 
 #' @export

@@ -149,27 +149,24 @@ policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()
   env <- one_sub_env(env)
   states <- table_index(env$observation_space, "observations", call)$count
   if (!inherits(env$action_space, "gym_space_discrete")) {
-    abort_table(
-      policy, paste("A table cannot have a column for each action of", format(env$action_space)),
-      call
+    abort_wrong(
+      "policy", policy, call,
+      "A table cannot have a column for each action of {format(env$action_space)}."
     )
   }
   actions <- as.double(env$action_space$n)
   if (nrow(policy$q) != states || ncol(policy$q) != actions) {
-    abort_table(policy, paste0(
-      "The policy's table has ", count_of(nrow(policy$q), "row"), " and ",
-      count_of(ncol(policy$q), "column"), ", but ", environment_label(env), " has ",
-      count_of(states, "state"), " and ", count_of(actions, "action"),
-      ": a table has a row for each state and a column for each action"
-    ), call)
+    abort_wrong(
+      "policy", policy, call,
+      "The policy's table has {count_of(nrow(policy$q), 'row')} and
+       {count_of(ncol(policy$q), 'column')}, but {environment_label(env)} has
+       {count_of(states, 'state')} and {count_of(actions, 'action')}: a table has a row for each
+       state and a column for each action."
+    )
   }
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy
-}
-
-abort_table <- function(policy, problem, call) {
-  abort_wrong("policy", policy, call, "{problem}.")
 }
 
 #' @export

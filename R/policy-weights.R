@@ -6,19 +6,6 @@ weight_shapes <- function(sizes, bias) {
   Map(c, sizes[-1L], sizes[-length(sizes)] + isTRUE(bias))
 }
 
-# Draws the weights in the order of the tutorial: first the matrix of the hidden layer, then the
-# weights of the output.
-draw_weights <- function(sizes, bias = FALSE, init = "uniform", last_gain = 1) {
-  shapes <- weight_shapes(sizes, bias)
-  if (init == "orthogonal") {
-    gain <- c(rep(sqrt(2), length(shapes) - 1L), last_gain)
-    return(Map(function(shape, gain) draw_orthogonal(shape, gain, bias), shapes, gain))
-  }
-  lapply(shapes, function(shape) {
-    matrix(stats::runif(prod(shape), -1, 1), shape[[1L]], shape[[2L]])
-  })
-}
-
 # Saxe, McClelland and Ganguli (2014): orthogonal rows, or columns if these are fewer, of length
 # `gain`; biases are 0.
 draw_orthogonal <- function(shape, gain, bias) {
@@ -31,12 +18,20 @@ draw_orthogonal <- function(shape, gain, bias) {
   cbind(gain * if (neurons >= inputs) basis else t(basis), if (isTRUE(bias)) numeric(neurons))
 }
 
-# If actions are drawn, all of them are nearly equally likely at first.
+# Draws the weights in the order of the tutorial: first the matrix of the hidden layer, then the
+# weights of the output.
 draw_first_weights <- function(policy) {
-  # An output that the environment chooses will draw.
-  draws <- is.na(policy$output) || has_log_prob(policy)
-  last_gain <- if (draws) 0.01 else 1
-  draw_weights(policy$sizes, policy$bias, policy$init, last_gain)
+  shapes <- weight_shapes(policy$sizes, policy$bias)
+  if (policy$init == "orthogonal") {
+    # If actions are drawn, all of them are nearly equally likely at first. An output that the
+    # environment chooses will draw.
+    draws <- is.na(policy$output) || has_log_prob(policy)
+    gain <- c(rep(sqrt(2), length(shapes) - 1L), if (draws) 0.01 else 1)
+    return(Map(draw_orthogonal, shapes, gain, isTRUE(policy$bias)))
+  }
+  lapply(shapes, function(shape) {
+    matrix(stats::runif(prod(shape), -1, 1), shape[[1L]], shape[[2L]])
+  })
 }
 
 # The user may have changed the weights. A network whose sizes depend on the environment has no

@@ -131,7 +131,16 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
     )
   }
   if (!inherits(x, "gym_policy") && !is.function(x) && !has_method(x, "act")) {
-    abort_no_policy(x, arg, call)
+    own <- class(x)[[1L]]
+    abort_wrong(
+      arg, x, call,
+      "`{arg}` must be a policy or a function of observations, not {describe_argument(x)}.",
+      i = if (has_method(x, "predict")) {
+        "`as_policy()` makes a policy of a model that predicts actions."
+      } else if (is.object(x)) {
+        '`.S3method("act", "{own}", f)` makes `f` the method by which objects of its class act.'
+      }
+    )
   }
   if (is.function(x) && !has_method(x, "act")) {
     check_takes_observations(x, arg, call)
@@ -177,19 +186,6 @@ check_one_policy <- function(x, arg, call) {
       i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."
     )
   }
-}
-
-abort_no_policy <- function(x, arg, call) {
-  own <- if (is.object(x)) class(x)[[1L]]
-  abort_wrong(
-    arg, x, call,
-    "`{arg}` must be a policy or a function of observations, not {describe_argument(x)}.",
-    i = if (has_method(x, "predict")) {
-      "`as_policy()` makes a policy of a model that predicts actions."
-    } else if (!is.null(own)) {
-      '`.S3method("act", "{own}", f)` makes `f` the method by which objects of its class act.'
-    }
-  )
 }
 
 # Is there a method of the generic function for the object's own class?
@@ -289,24 +285,20 @@ predict_policy.gym_policy_network <- function(policy, newdata, type, call = rlan
   }
   outputs <- network_outputs(policy, rows$values, call)
   if (type == "probability") {
-    return(output_probabilities(policy, outputs, call))
+    if (identical(policy$output, "softmax")) {
+      return(softmax_rows(outputs))
+    }
+    if (!identical(policy$output, "epsilon-greedy")) {
+      abort_no_probabilities(policy, call)
+    }
+    n <- policy$action_space$n %||% max(ncol(outputs), 2L)
+    p <- matrix(policy$epsilon / n, nrow(outputs), n)
+    best <- discrete_action(NULL, outputs, greedy_policy(policy)) + 1L
+    best <- cbind(seq_len(nrow(outputs)), best)
+    p[best] <- p[best] + 1 - policy$epsilon
+    return(p)
   }
   if (ncol(outputs) == 1L) outputs[, 1L] else outputs
-}
-
-# The probability of each action, a row for each row of outputs.
-output_probabilities <- function(policy, outputs, call) {
-  if (identical(policy$output, "softmax")) {
-    return(softmax_rows(outputs))
-  }
-  if (!identical(policy$output, "epsilon-greedy")) {
-    abort_no_probabilities(policy, call)
-  }
-  n <- policy$action_space$n %||% max(ncol(outputs), 2L)
-  p <- matrix(policy$epsilon / n, nrow(outputs), n)
-  best <- cbind(seq_len(nrow(outputs)), discrete_action(NULL, outputs, greedy_policy(policy)) + 1L)
-  p[best] <- p[best] + 1 - policy$epsilon
-  p
 }
 
 abort_no_probabilities <- function(policy, call) {

@@ -2,7 +2,16 @@
 
 check_training <- function(settings, call) {
   check_environment(settings$env, "env", call)
-  check_trained_policy(settings$policy, settings$agent, call)
+  policy <- settings$policy
+  if (learns_online(settings$agent)) {
+    if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
+      must <- "NULL, or a table of values made by `policy_table()`"
+      abort_argument(policy, must, "policy", call)
+    }
+  } else if (!inherits(policy, "gym_policy_network")) {
+    check_policy(policy, "policy", call)
+    abort_no_weights(policy, "policy", call)
+  }
   check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
   if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
@@ -13,16 +22,12 @@ check_training <- function(settings, call) {
     )
   }
   check_seed(settings$seed, arg = "seed", call = call)
-  for (name in c("iterations", "max_steps")) {
-    check_count(settings[[name]], allow_null = TRUE, arg = name, call = call)
+  least <- c(iterations = 1, max_steps = 1, episodes = 1, eval_every = 1, eval_episodes_curve = 0,
+             eval_episodes = 2)
+  for (name in names(least)) {
+    optional <- name %in% c("iterations", "max_steps")
+    check_count(settings[[name]], least[[name]], allow_null = optional, arg = name, call = call)
   }
-  for (name in c("episodes", "eval_every")) {
-    check_count(settings[[name]], arg = name, call = call)
-  }
-  check_count(
-    settings$eval_episodes_curve, min = 0, arg = "eval_episodes_curve", call = call
-  )
-  check_count(settings$eval_episodes, min = 2, arg = "eval_episodes", call = call)
   if (is.null(settings$iterations) && is.null(settings$total_steps)) {
     abort_no_budget(names(settings$kwargs), settings$agent, NULL, call)
   }
@@ -104,18 +109,6 @@ check_training_ends <- function(vector_env, settings, online, call) {
       "An episode of {environment_label(vector_env)} that reaches state {state} never ends.",
       i = "Give `max_steps`, after which an episode is cut off, or let the model end there."
     )
-  }
-}
-
-check_trained_policy <- function(policy, agent, call) {
-  if (learns_online(agent)) {
-    if (!is.null(policy) && !inherits(policy, "gym_policy_table")) {
-      must <- "NULL, or a table of values made by `policy_table()`"
-      abort_argument(policy, must, "policy", call)
-    }
-  } else if (!inherits(policy, "gym_policy_network")) {
-    check_policy(policy, "policy", call)
-    abort_no_weights(policy, "policy", call)
   }
 }
 

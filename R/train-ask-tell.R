@@ -144,8 +144,9 @@ print.gym_agent <- function(x, ...) {
 #' @export
 format.gym_agent <- function(x, ...) class(x)[[1L]]
 
-# "ARS V2-t, 8 directions": an agent's name, then its settings as name and value.
+# "ARS V2-t, 8 directions": an agent's name, then its settings as name and value, without schedules.
 agent_text <- function(name, settings) {
+  settings <- Filter(Negate(is.function), settings)
   values <- vapply(settings, number_text, "")
   paste0(name, ": ", paste(names(settings), values, sep = " ", collapse = ", "))
 }

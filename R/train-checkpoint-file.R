@@ -29,14 +29,6 @@ read_checkpoint <- function(path, call) {
   unserialize(file$state)
 }
 
-# Removes what a process that was killed while writing has left. Another process may still be
-# writing a file from the last ten minutes.
-remove_parts <- function(path) {
-  files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
-  parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
-  unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
-}
-
 write_checkpoint <- function(path, state) {
   state <- serialize(state, NULL)
   file <- structure(
@@ -124,7 +116,10 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
     if (!identical(file_mark(path), written)) {
       whose <- overtaken_by(path, own, what)
       if (!is.null(whose)) {
-        if (!overtaken) warn_overtaken(path, whose)
+        if (!overtaken) {
+          warn_checkpoint(path, paste0(whose, ", and is left as it is"),
+                          i = "Give each of them its own `checkpoint` file.")
+        }
         overtaken <<- TRUE
         return()
       }
@@ -141,7 +136,10 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
       write(),
       error = function(cnd) {
         # A full disk must not end hours of playing.
-        if (!failed) warn_not_written(path, what, cnd)
+        if (!failed) {
+          warn_checkpoint(path, paste("cannot be written; the", what, "continues without it"),
+                          x = conditionMessage(cnd))
+        }
         failed <<- TRUE
       }
     )
@@ -166,19 +164,9 @@ overtaken_by <- function(path, own, what) {
   }
 }
 
-warn_overtaken <- function(path, whose) {
+warn_checkpoint <- function(path, problem, ...) {
   rlang::warn(
-    c(paste0("The checkpoint \"", path, "\" ", whose, ", and is left as it is."),
-      i = "Give each of them its own `checkpoint` file."),
-    class = "gym_warning_checkpoint"
-  )
-}
-
-warn_not_written <- function(path, what, cnd) {
-  rlang::warn(
-    c(paste0("The checkpoint \"", path, "\" cannot be written; the ", what,
-             " continues without it."),
-      x = conditionMessage(cnd)),
+    c(paste0("The checkpoint \"", path, "\" ", problem, "."), ...),
     class = "gym_warning_checkpoint"
   )
 }

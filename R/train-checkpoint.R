@@ -22,14 +22,26 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
     folder <- paste0("`dir.create(\"", dirname(path), "\")` makes the folder.")
     abort_checkpoint(path, "is in a folder that does not exist", hint = folder, call = call)
   }
-  remove_parts(path)
+  # A process that was killed while writing has left parts. Another one may still be writing what is
+  # younger than ten minutes.
+  files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
+  parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
+  unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
   mark <- file_mark(path)
   saved <- if (resume) read_checkpoint(path, call)
   if (!is.null(saved)) {
     if (!identical(saved$what, what)) {
       abort_checkpoint(path, paste("is that of a", saved$what), call = call)
     }
-    check_same_arguments(path, saved$arguments, arguments, what, call)
+    check_same(path, saved$arguments, arguments, paste("is that of another", what), function(name) {
+      there <- argument_text(name, saved$arguments[[name]])
+      here <- argument_text(name, arguments[[name]])
+      if (there == here) {
+        paste0("`", name, "` is another there", if (name == "policy") ", with other weights", ".")
+      } else {
+        paste0("`", name, "` is ", there, " there, and ", here, " here.")
+      }
+    }, call)
   }
   list(path = path, arguments = arguments, saved = saved, mark = mark)
 }
@@ -47,13 +59,26 @@ training_checkpoint <- function(state, file, settings, call) {
     if (settings$search) "target", "env_id", "num_envs", "batch_size", "from_model"
   )]
   if (!is.null(file$saved)) {
-    check_same_server(file$path, file$saved$server, server, call)
+    # Another server may run the sub-environments in another way, and then plays other episodes.
+    names <- c(
+      target = "the environment's reward threshold", env_id = "the environment",
+      batch_size = "how many episodes make a batch",
+      num_envs = "how many sub-environments there are",
+      from_model = "whether it learns from the model"
+    )
+    there <- file$saved$server
+    check_same(file$path, there, server, "is from a server with other settings", function(name) {
+      paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
+             describe_value(server[[name]]), " on this server.")
+    }, call)
     resume_training(state, file$saved, file$path, call)
     # With a larger budget the final evaluation comes later.
     state$final <- NULL
     state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
     # With a higher target it goes on.
-    if (state$solved && !settings$search && !reaches(stopped_at(state), settings$target)) {
+    stopping <- Filter(function(row) row$kind == "stopping", state$evaluations)
+    if (state$solved && !settings$search &&
+          !reaches(stopping[[length(stopping)]]$mean_return, settings$target)) {
       state$solved <- state$ended <- FALSE
     }
     played <- played_text(settings, state)
@@ -74,11 +99,6 @@ training_checkpoint <- function(state, file, settings, call) {
     )
   }, settings$what, call)
   function(last = FALSE) write(now = last)
-}
-
-# The mean return of the evaluation that ended a training.
-stopped_at <- function(state) {
-  utils::tail(Filter(function(row) row$kind == "stopping", state$evaluations), 1L)[[1L]]$mean_return
 }
 
 resume_training <- function(state, saved, path, call = NULL) {
@@ -127,23 +147,20 @@ inform_resumed <- function(text, .envir = parent.frame()) {
 
 #' @export
 print.gym_checkpoint <- function(x, ...) {
-  current <- identical(x$format, checkpoint_format)
-  saved <- if (current) unserialize(x$state)
+  if (!identical(x$format, checkpoint_format)) {
+    cat("<checkpoint by gym ", x$version, ", which this version cannot read>\n", sep = "")
+    return(invisible(x))
+  }
+  saved <- unserialize(x$state)
   training <- saved$training
   cat(
-    if (is.null(saved)) {
-      paste0("<checkpoint by gym ", x$version, ", which this version cannot read>")
-    } else {
-      c(
-        paste0("<checkpoint of a ", saved$what, " in ", saved$server$env_id, " by ",
-               format(training$agent), ">"),
-        paste0("Seed ", whole_number_text(saved$seed), ", ",
-               count_of(training$iteration, if (saved$what == "search") "round" else "iteration"),
-               ", ", count_of(training$steps, "step"), if (training$ended) ", ended"),
-        "The call that wrote the file resumes from it: give the file as `checkpoint`.",
-        "Its result is a training; this object has none of its elements."
-      )
-    },
+    paste0("<checkpoint of a ", saved$what, " in ", saved$server$env_id, " by ",
+           format(training$agent), ">"),
+    paste0("Seed ", whole_number_text(saved$seed), ", ",
+           count_of(training$iteration, if (saved$what == "search") "round" else "iteration"), ", ",
+           count_of(training$steps, "step"), if (training$ended) ", ended"),
+    "The call that wrote the file resumes from it: give the file as `checkpoint`.",
+    "Its result is a training; this object has none of its elements.",
     sep = "\n"
   )
   invisible(x)
@@ -158,23 +175,26 @@ training_arguments <- function(settings) {
     "episodes", if (settings$search) "target", "max_steps", "eval_every", "eval_episodes",
     "eval_episodes_curve", "seed"
   )
+  agent <- settings$agent
+  # The source of an agent's settings makes no difference. The memory of one that goes on is large.
+  agent$preset <- NULL
+  if (inherits(agent$memory, "gym_memory")) agent$memory <- rlang::hash(agent$memory)
+  policy <- settings$policy
+  # An agent that draws all weights ignores those of the policy, so the distribution is compared.
+  if (inherits(agent, "gym_agent_random")) {
+    policy <- with_generator(new_generator(1), policy_resample(policy))
+  }
+  # The training's seed determines weights that are not drawn yet.
+  policy$weights_seed <- NULL
   c(
     list(
       env = c(environment_traits(settings$env), kwargs = list(settings$kwargs)),
-      agent = comparable_agent(settings$agent),
-      policy = comparable_policy(settings$policy, settings$agent)
+      agent = agent, policy = policy
     ),
     if (settings$search) list(rounds = settings$iterations),
     settings["evaluate"],
     lapply(settings[numbers], function(x) if (!is.null(x)) as.numeric(x))
   )
-}
-
-# The source of an agent's settings makes no difference. The memory of one that goes on is large.
-comparable_agent <- function(agent) {
-  agent$preset <- NULL
-  if (inherits(agent$memory, "gym_memory")) agent$memory <- rlang::hash(agent$memory)
-  agent
 }
 
 environment_traits <- function(env) {
@@ -193,28 +213,11 @@ environment_traits <- function(env) {
   }
 }
 
-# The training's seed determines weights that are not drawn yet. An agent that draws all weights
-# ignores those of the policy, so the distribution is compared.
-comparable_policy <- function(policy, agent) {
-  if (inherits(agent, "gym_agent_random")) {
-    policy <- with_generator(new_generator(1), policy_resample(policy))
-  }
-  policy$weights_seed <- NULL
-  policy
-}
-
-check_same_arguments <- function(path, there, here, what, call) {
+# `line_of` is a function of a name, whose values differ.
+check_same <- function(path, there, here, problem, line_of, call) {
   differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
   if (length(differ)) {
-    lines <- vapply(differ, function(name) {
-      texts <- c(argument_text(name, there[[name]]), argument_text(name, here[[name]]))
-      if (texts[[1L]] == texts[[2L]]) {
-        paste0("`", name, "` is another there", if (name == "policy") ", with other weights", ".")
-      } else {
-        paste0("`", name, "` is ", texts[[1L]], " there, and ", texts[[2L]], " here.")
-      }
-    }, "")
-    abort_checkpoint(path, paste("is that of another", what), lines, call, argument = differ)
+    abort_checkpoint(path, problem, vapply(differ, line_of, ""), call, argument = differ)
   }
 }
 
@@ -232,23 +235,6 @@ argument_text <- function(name, value) {
     agent = format(value),
     if (is.numeric(value)) number_text(value) else describe_value(value)
   )
-}
-
-# Another server may run the sub-environments in another way, and then plays other episodes.
-check_same_server <- function(path, there, now, call) {
-  names <- c(
-    target = "the environment's reward threshold", env_id = "the environment",
-    batch_size = "how many episodes make a batch", num_envs = "how many sub-environments there are",
-    from_model = "whether it learns from the model"
-  )
-  differ <- Filter(function(name) !is_same(there[[name]], now[[name]]), names(now))
-  if (length(differ)) {
-    lines <- vapply(differ, function(name) {
-      paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
-             describe_value(now[[name]]), " on this server.")
-    }, "")
-    abort_checkpoint(path, "is from a server with other settings", lines, call)
-  }
 }
 
 other_file_hint <- paste(

@@ -5,7 +5,15 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
   found <- run_scores(trainings, curves, settings$total_steps, call)
   runs <- found$runs
   ids <- unique(runs$env_id)
-  check_same_environments(runs, call)
+  of_each <- lapply(split(runs$env_id, runs$training), function(ids) {
+    sort(unique(ids), na.last = TRUE)
+  })
+  if (length(unique(of_each)) > 1L) {
+    abort_wrong(
+      "...", NULL, call, "All agents must have been trained in the same environments.",
+      x = '{paste0(names(of_each), ": ", vapply(of_each, toString, ""), collapse = "; ")}'
+    )
+  }
   if (is.null(reference) && length(ids) > 1L) reference <- default_reference(trainings, call)
   if (!is.null(reference)) runs$score <- normalised_scores(runs, reference, call)
   scores <- lapply(split(runs, factor(runs$training, unique(runs$training))), function(own) {
@@ -69,16 +77,6 @@ run_scores <- function(trainings, curves, steps, call) {
   )
 }
 
-check_same_environments <- function(runs, call) {
-  ids <- lapply(split(runs$env_id, runs$training), function(ids) sort(unique(ids), na.last = TRUE))
-  if (length(unique(ids)) > 1L) {
-    abort_wrong(
-      "...", NULL, call, "All agents must have been trained in the same environments.",
-      x = '{paste0(names(ids), ": ", vapply(ids, toString, ""), collapse = "; ")}'
-    )
-  }
-}
-
 # Normalising ---------------------------------------------------------------------------
 
 # The return of a random policy, and the environment's threshold.
@@ -93,8 +91,14 @@ default_reference <- function(trainings, call) {
   ones <- lapply(trainings, function(x) each_training(x)[[1L]])
   ones <- ones[!duplicated(vapply(ones, function(one) one$env_id, ""))]
   do.call(rbind, unname(lapply(ones, function(one) {
-    high <- environment_threshold(one)
-    if (is.null(high)) {
+    registered <- if (is.character(one$env)) {
+      known <- env_registry(search = one$env)
+      known$reward_threshold[known$id == one$env]
+    } else {
+      one$env$spec$reward_threshold
+    }
+    high <- training_target(NULL, list(id = one$env_id, reward_threshold = registered))
+    if (!length(high) || is.na(high)) {
       abort_wrong(
         "reference", NULL, call,
         "{one$env_id} has no threshold, by which scores could be normalised.",
@@ -107,17 +111,6 @@ default_reference <- function(trainings, call) {
     )
     data.frame(env_id = one$env_id, low = random$mean_return, high = as.numeric(high))
   })))
-}
-
-environment_threshold <- function(one) {
-  registered <- if (is.character(one$env)) {
-    known <- env_registry(search = one$env)
-    known$reward_threshold[known$id == one$env]
-  } else {
-    one$env$spec$reward_threshold
-  }
-  threshold <- training_target(NULL, list(id = one$env_id, reward_threshold = registered))
-  if (length(threshold) && !is.na(threshold)) threshold
 }
 
 normalised_scores <- function(runs, reference, call) {

@@ -100,7 +100,12 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
     check_are_trainings(given, call)
     given_trainings(given, call, unique = FALSE)
   } else {
-    check_curves(curves, call)
+    missing <- setdiff(c("training", "seed", "steps", "mean_return"), names(curves))
+    if (length(missing)) {
+      must <- paste0("a table as `learning_curves()` returns it, with a column `", missing[[1L]],
+                     "`")
+      abort_argument(curves, must, "...", call)
+    }
     list()
   }
   if (!length(trainings) && !NROW(curves)) {
@@ -113,7 +118,8 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
   compared <- if (stop_at_target(trainings, call)) {
     compare_by_steps(trainings, level, call)
   } else {
-    compare_by_scores(trainings, curves %||% curves_of(trainings), settings, reference, call)
+    curves <- curves %||% do.call(rbind, curves_of(trainings, NULL))
+    compare_by_scores(trainings, curves, settings, reference, call)
   }
   settings["total_steps"] <- compared["total_steps"]
   ids <- unique(compared$runs$env_id)
@@ -125,15 +131,15 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
   compared$notes <- c(compared$notes, unequal_rules(trainings))
   compared$total_steps <- NULL
   few <- min(runs_each(compared$runs))
-  if (few < 5L) warn_few_seeds(few)
+  if (few < 5L) {
+    rlang::warn(
+      c(paste0("There ", if (few == 1L) "is " else "are ", count_of(few, "seed"),
+               " of a training: intervals of so few mean little."),
+        i = "Train with at least five, better ten or more."),
+      class = "gym_warning_seeds"
+    )
+  }
   structure(c(compared, settings), class = "gym_comparison")
-}
-
-curves_of <- function(trainings) {
-  do.call(rbind, unname(Map(function(x, label) {
-    rows <- curve_rows(x, label, NULL)
-    cbind(training = rep(label, nrow(rows)), rows)
-  }, trainings, names(trainings))))
 }
 
 check_are_trainings <- function(given, call) {
@@ -186,23 +192,6 @@ check_different_runs <- function(trainings, call) {
 
 # The number of runs of each training in each environment.
 runs_each <- function(runs) table(paste(runs$training, runs$env_id, sep = "\r"))
-
-warn_few_seeds <- function(few) {
-  rlang::warn(
-    c(paste0("There ", if (few == 1L) "is " else "are ", count_of(few, "seed"),
-             " of a training: intervals of so few mean little."),
-      i = "Train with at least five, better ten or more."),
-    class = "gym_warning_seeds"
-  )
-}
-
-check_curves <- function(curves, call) {
-  missing <- setdiff(c("training", "seed", "steps", "mean_return"), names(curves))
-  if (length(missing)) {
-    must <- paste0("a table as `learning_curves()` returns it, with a column `", missing[[1L]], "`")
-    abort_argument(curves, must, "...", call)
-  }
-}
 
 check_reference <- function(reference, call) {
   columns <- c("env_id", "low", "high")

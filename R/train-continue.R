@@ -18,7 +18,18 @@ agent_to_train <- function(agent, policy, search, call) {
     agent$started <- NULL
   }
   if (has_started(agent)) {
-    check_still_learns(agent, call)
+    rate <- agent$learning_rate
+    taken <- agent$steps %||% agent$taken
+    # A schedule that has come to its end at 0 would let the training go on in vain.
+    if (is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0)) {
+      abort_wrong(
+        "learning_rate", rate, call,
+        'The schedule of `learning_rate` is 0 after the agent\'s {count_of(taken, "step")}, so it
+         would learn nothing more.',
+        i = "Give a new `learning_rate` along with `policy = training`, or set it:
+             `agent$learning_rate <- 1e-4`."
+      )
+    }
     cli::cli_inform(
       c(i = paste("Going on with a trained agent, with all that it has learned. A new one, made by",
                   "a function such as {.code agent_ppo()}, starts again.")),
@@ -68,21 +79,6 @@ take_over <- function(earlier, agent, call) {
   }
   earlier[settings] <- agent[settings]
   earlier
-}
-
-# A schedule that has come to its end at 0 would let the training go on in vain.
-check_still_learns <- function(agent, call) {
-  rate <- agent$learning_rate
-  taken <- agent$steps %||% agent$taken
-  if (is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0)) {
-    abort_wrong(
-      "learning_rate", rate, call,
-      "The schedule of `learning_rate` is 0 after the agent's {count_of(taken, \"step\")}, so it
-       would learn nothing more.",
-      i = "Give a new `learning_rate` along with `policy = training`, or set it:
-           `agent$learning_rate <- 1e-4`."
-    )
-  }
 }
 
 # An agent that goes on, in this environment.

@@ -44,15 +44,23 @@ learning_curves <- function(..., at = NULL) {
   if (!is.null(at) && !(is.numeric(at) && all(is.finite(at) & at >= 0))) {
     abort_argument(at, "numbers of steps", "at", call)
   }
-  given <- with_settings(name_results(list(...), as.list(substitute(list(...)))[-1L]))
-  rows <- Map(function(x, label) {
-    rows <- curve_rows(x, label, call)
-    cbind(training = rep(label, nrow(rows)), rows)
-  }, given, names(given))
-  table <- do.call(rbind, c(list(cbind(training = character(), no_curve)), unname(rows)))
+  given <- name_results(list(...), as.list(substitute(list(...)))[-1L])
+  # Each setting of a sweep is a training with its own name.
+  given <- do.call(c, unname(Map(function(x, label) {
+    own <- if (inherits(x, "gym_sweep")) x$trainings else stats::setNames(list(x), label)
+    Filter(Negate(is.null), own)
+  }, given, names(given))))
+  table <- do.call(rbind, c(list(cbind(training = character(), no_curve)), curves_of(given, call)))
   if (!is.null(at)) table <- curves_at(table, at)
   row.names(table) <- NULL
   table
+}
+
+curves_of <- function(trainings, call) {
+  unname(Map(function(x, label) {
+    rows <- curve_rows(x, label, call)
+    cbind(training = rep(label, nrow(rows)), rows)
+  }, trainings, names(trainings)))
 }
 
 # All runs at the same numbers of steps.
@@ -80,14 +88,6 @@ returns_at <- function(curve, at) {
   }
 }
 
-# Each setting of a sweep is a training with its own name.
-with_settings <- function(given) {
-  do.call(c, unname(Map(function(x, label) {
-    own <- if (inherits(x, "gym_sweep")) x$trainings else stats::setNames(list(x), label)
-    Filter(Negate(is.null), own)
-  }, given, names(given))))
-}
-
 no_curve <- data.frame(
   env_id = character(), seed = numeric(), iteration = integer(), steps = numeric(),
   kind = character(), mean_return = numeric(), se = numeric(), lower = numeric(),
@@ -106,7 +106,22 @@ curve_rows <- function(x, label, call) {
     evaluations$steps <- evaluation_steps(x)
     evaluations[names(no_curve)]
   } else if (rlang::is_string(x)) {
-    read_curves(x, call)
+    if (!file.exists(x)) {
+      abort_wrong("...", x, call, 'There is no file or folder "{x}".')
+    }
+    rows <- read_logs(x, call)[[1L]]
+    if (is.null(rows)) {
+      abort_wrong(
+        "...", x, call, '"{x}" has no log of a training.',
+        i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
+             Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
+        i = if (endsWith(x, ".rds")) "A result that `readRDS()` returns is an argument, too."
+      )
+    }
+    # Runs with unknown seeds are numbered.
+    unknown <- is.na(rows$seed)
+    rows$seed[unknown] <- match(rows$run[unknown], unique(rows$run))
+    rows[names(no_curve)]
   } else {
     must <- "a training, or the folder or file of a log, a string"
     abort_argument(x, must, if (nzchar(label)) label else "...", call)
@@ -117,25 +132,6 @@ curve_rows <- function(x, label, call) {
 
 # Learning curves from log files: our own, Stable-Baselines3's and CleanRL's.
 
-read_curves <- function(path, call) {
-  if (!file.exists(path)) {
-    abort_wrong("...", path, call, 'There is no file or folder "{path}".')
-  }
-  rows <- read_logs(path, call)[[1L]]
-  if (is.null(rows)) {
-    abort_wrong(
-      "...", path, call, '"{path}" has no log of a training.',
-      i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
-           Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
-      i = if (endsWith(path, ".rds")) "A result that `readRDS()` returns is an argument, too."
-    )
-  }
-  # Runs with unknown seeds are numbered.
-  unknown <- is.na(rows$seed)
-  rows$seed[unknown] <- match(rows$run[unknown], unique(rows$run))
-  rows[names(no_curve)]
-}
-
 #' Read files or folders, each by itself
 #'
 #' A crash may leave a damaged file, which must not hide the others: it is warned of. If all are
@@ -144,10 +140,15 @@ read_curves <- function(path, call) {
 #' @noRd
 read_logs <- function(paths, call, read = function(path) path_curves(path, call)) {
   each <- lapply(paths, function(path) {
-    tryCatch(
-      tryCatch(read(path), error = function(cnd) abort_damaged(path, cnd, call)),
-      gym_error_argument = identity
-    )
+    damaged <- function(cnd) {
+      tryCatch(
+        abort_wrong(
+          "...", path, call, 'The log "{path}" is damaged.', x = "{conditionMessage(cnd)}"
+        ),
+        error = identity
+      )
+    }
+    tryCatch(read(path), gym_error_argument = identity, error = damaged)
   })
   damaged <- vapply(each, inherits, NA, "gym_error_argument")
   if (length(each) && all(damaged)) rlang::cnd_signal(each[[1L]])
@@ -155,14 +156,6 @@ read_logs <- function(paths, call, read = function(path) path_curves(path, call)
     rlang::warn(c(conditionMessage(cnd), i = "It is left out."), class = "gym_warning_log")
   }
   each[!damaged]
-}
-
-abort_damaged <- function(path, cnd, call) {
-  if (inherits(cnd, "gym_error_argument")) rlang::cnd_signal(cnd)
-  abort_wrong(
-    "...", path, call, 'The log "{path}" is damaged.',
-    x = "{conditionMessage(cnd)}"
-  )
 }
 
 path_curves <- function(path, call) {
@@ -177,7 +170,9 @@ path_curves <- function(path, call) {
 folder_curves <- function(path, call) {
   inside <- function(name) file.path(path, name)
   if (file.exists(inside("config.json")) && file.exists(inside("evaluations.csv"))) {
-    return(own_curves(path))
+    config <- jsonlite::read_json(inside("config.json"))
+    rows <- utils::read.csv(inside("evaluations.csv"))
+    return(run_rows(path, rows, env_id = config$env, seed = config$seed))
   }
   files <- c(inside("progress.csv"), list.files(path, "monitor[.]csv$", full.names = TRUE))
   tables <- read_logs(files[file.exists(files)], call, file_table)
@@ -193,23 +188,14 @@ folder_curves <- function(path, call) {
   do.call(rbind, read_logs(setdiff(below, files), call))
 }
 
-own_curves <- function(path) {
-  config <- jsonlite::read_json(file.path(path, "config.json"))
-  rows <- utils::read.csv(file.path(path, "evaluations.csv"))
-  run_rows(path, rows, env_id = config$env, seed = config$seed)
-}
-
-# Files of saveRDS() contain zeros.
-is_text <- function(file) {
-  opened <- gzfile(file, "rb")
-  on.exit(close(opened))
-  !any(readBin(opened, "raw", 1000L) == as.raw(0L))
-}
-
 # The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies
 # the kind of file.
 file_table <- function(file) {
-  lines <- if (is_text(file)) readLines(file, warn = FALSE)
+  opened <- gzfile(file, "rb")
+  # Files of saveRDS() contain zeros.
+  is_text <- !any(readBin(opened, "raw", 1000L) == as.raw(0L))
+  close(opened)
+  lines <- if (is_text) readLines(file, warn = FALSE)
   if (!length(lines)) {
     return(NULL)
   }

@@ -25,8 +25,14 @@ training_ends <- function(state, vector_env, settings) {
   if (settings$search) {
     return(state$solved <- reaches(state$history[[state$iteration]]$mean_return, settings$target))
   }
-  if (evaluated_lately(state, settings)) {
-    return(FALSE)
+  last <- utils::tail(state$evaluations, 1L)
+  if (length(last) && is_exact(last[[1L]])) {
+    # Exact evaluations in a large model take time; see steps_between_evaluations().
+    at <- last[[1L]]$iteration
+    before <- if (at) state$history[[at]]$steps else 0
+    if (state$steps - before < settings$eval_steps) {
+      return(FALSE)
+    }
   }
   reached <- reaches(recent_return(state), settings$target)
   if (!reached && state$iteration %% settings$eval_every == 0) {
@@ -38,17 +44,6 @@ training_ends <- function(state, vector_env, settings) {
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
-}
-
-# Exact evaluations in a large model take time; see steps_between_evaluations().
-evaluated_lately <- function(state, settings) {
-  last <- utils::tail(state$evaluations, 1L)
-  if (!length(last) || !is_exact(last[[1L]])) {
-    return(FALSE)
-  }
-  iteration <- last[[1L]]$iteration
-  before <- if (iteration) state$history[[iteration]]$steps else 0
-  state$steps - before < settings$eval_steps
 }
 
 # An iteration of DQN is a single episode, and one that was lucky does not justify an evaluation of
@@ -68,14 +63,6 @@ recent_return <- function(state) {
   later <- rev(cumsum(rev(episodes))) - episodes
   counts <- later < enough_episodes
   stats::weighted.mean(of("mean_return")[counts], episodes[counts])
-}
-
-# The untrained policy, if its episodes are sure to end.
-evaluate_start <- function(state, vector_env, settings) {
-  limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
-  if (!settings$search && !state$iteration && !length(state$evaluations) && !is.null(limit)) {
-    evaluate_for_curve(state, vector_env, settings)
-  }
 }
 
 evaluate_for_curve <- function(state, vector_env, settings) {

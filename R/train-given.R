@@ -103,7 +103,16 @@ unequal_rules <- function(trainings) {
     unequal <- function(what, names) unequal_text(paste0(what, " differ", where), rules, names)
     rules <- lapply(those, function(x) {
       one <- each_training(x)[[1L]]
-      c(list(target = one$target %||% Inf), one$rules, environment_settings(one))
+      kwargs <- vapply(one$kwargs, describe_value, "")
+      wrappers <- one$provenance$wrappers
+      c(
+        list(
+          target = one$target %||% Inf,
+          arguments = if (length(kwargs)) toString(paste(names(kwargs), "=", kwargs)),
+          wrappers = if (length(wrappers)) toString(wrappers)
+        ),
+        one$rules
+      )
     })
     c(
       unequal("targets", "target"),
@@ -112,16 +121,6 @@ unequal_rules <- function(trainings) {
       unequal("rules of evaluation", kept_rules[-(1:2)])
     )
   }))
-}
-
-# What `env_id` does not say of a training's environment, strings.
-environment_settings <- function(one) {
-  kwargs <- one$kwargs
-  values <- vapply(kwargs, describe_value, "")
-  list(
-    arguments = if (length(kwargs)) toString(paste(names(kwargs), "=", values)),
-    wrappers = if (length(one$provenance$wrappers)) toString(one$provenance$wrappers)
-  )
 }
 
 # `NULL` if all trainings have the same rules.

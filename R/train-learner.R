@@ -110,7 +110,17 @@ learn_episodes <- function(state, vector_env, settings, call) {
   state$uniform$renew()
   learner <- learner_of(agent, state$uniform$draw)
   if (is.null(learner)) {
-    return(learn_by_methods(state, vector_env, settings, call))
+    # A learner written by a user.
+    by_methods <- list(
+      act = function(observation, sub_env) agent_act(agent, observation, sub_env),
+      observe = function(transitions) {
+        check_rewards(transitions$reward, call)
+        agent <<- agent_observe(agent, transitions)
+        check_is_agent(agent, "agent_observe()", call)
+      }
+    )
+    played <- episode_results(play_iteration(state, vector_env, settings, by_methods))
+    return(c(list(agent = agent), played))
   }
   vector_env <- stepped(vector_env)
   if (!is.null(agent$mask)) {
@@ -164,21 +174,6 @@ learn_alone <- function(learner, state, vector_env, settings, call) {
   ))
 }
 
-# A learner written by a user.
-learn_by_methods <- function(state, vector_env, settings, call) {
-  agent <- state$agent
-  learner <- list(
-    act = function(observation, sub_env) agent_act(agent, observation, sub_env),
-    observe = function(transitions) {
-      check_rewards(transitions$reward, call)
-      agent <<- agent_observe(agent, transitions)
-      check_is_agent(agent, "agent_observe()", call)
-    }
-  )
-  history <- play_iteration(state, vector_env, settings, learner)
-  c(list(agent = agent), episode_results(history))
-}
-
 # The episodes of an iteration, in the same loop as rollouts.
 play_iteration <- function(state, vector_env, settings, learner) {
   history <- new_history(1L, settings$episodes, state$streams)
@@ -209,35 +204,31 @@ check_rewards <- function(reward, call) {
 #' The server is asked only about environments given by their id that may have a model.
 #' @noRd
 judging_model <- function(settings, client) {
-  model <- known_model(settings, client)
-  # Each evaluation needs it.
-  if (!is.null(model)) model$backup <- backup_of(model, NULL)
-  model
-}
-
-known_model <- function(settings, client) {
   env <- settings$env
-  if (inherits(env, c("gym_model", "gym_r_env"))) {
-    model_or_null(env_model(env))
-  } else if (rlang::is_string(env) && (is_registered(env) || grepl(modelled_ids, env))) {
-    # inject() leaves `client` unevaluated, which an environment in R does not need.
-    model <- model_or_null(rlang::inject(env_model(env, !!!settings$kwargs, client = client)))
-    if (!is.null(model) && !is_registered(env)) model$versions <- server_versions(client)
-    model
+  named <- rlang::is_string(env)
+  served <- named && !is_registered(env)
+  in_r <- inherits(env, c("gym_model", "gym_r_env")) || named && !served
+  if (!in_r && !(served && grepl(modelled_ids, env))) {
+    return(NULL)
   }
-}
-
-modelled_ids <- "^(FrozenLake|CliffWalking|Taxi)"
-
-model_or_null <- function(code) {
-  tryCatch(
-    code, gym_error_no_model = function(cnd) NULL,
+  model <- tryCatch(
+    # inject() leaves `client` unevaluated, which an environment in R does not need.
+    rlang::inject(env_model(env, !!!if (named) c(settings$kwargs, client = quote(client)))),
+    gym_error_no_model = function(cnd) NULL,
     gym_error_http_400 = function(cnd) {
       # Taxi with a fickle passenger, for example, has no valid table.
       if (!identical(cnd$code, "not_supported")) rlang::cnd_signal(cnd)
     }
   )
+  if (!is.null(model)) {
+    if (served) model$versions <- server_versions(client)
+    # Each evaluation needs it.
+    model$backup <- backup_of(model, NULL)
+  }
+  model
 }
+
+modelled_ids <- "^(FrozenLake|CliffWalking|Taxi)"
 
 # Sampling from a model ---------------------------------------------------------------
 

@@ -63,6 +63,12 @@ training_log <- function(folder, settings, state, call) {
     replace_content(table, as_lines(log_lines(state, seq_len(state$iteration))))
     replace_content(evaluations, as_lines(evaluation_lines(state)))
   }
+  fail <- function(cnd) {
+    abort_wrong(
+      "log", folder, call, 'The log cannot be written to "{folder}".',
+      x = "{conditionMessage(cnd)}", i = "Give another folder as `log`."
+    )
+  }
   tryCatch(
     {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
@@ -71,8 +77,7 @@ training_log <- function(folder, settings, state, call) {
       if (state$iteration == 0L) for (file in c(table, evaluations)) keep_as_earlier(file)
       write_all()
     },
-    error = function(cnd) abort_log(folder, cnd, call),
-    warning = function(cnd) abort_log(folder, cnd, call)
+    error = fail, warning = fail
   )
   logged <- state$iteration
   evaluated <- length(state$evaluations)
@@ -96,7 +101,13 @@ training_log <- function(folder, settings, state, call) {
       },
       error = function(cnd) {
         whole <<- FALSE
-        if (!failed) warn_not_logged(table, cnd)
+        if (!failed) {
+          rlang::warn(
+            c(paste0("The log \"", table, "\" cannot be written; the training continues without ",
+                     "it."), x = conditionMessage(cnd)),
+            class = "gym_warning_log"
+          )
+        }
         failed <<- TRUE
       }
     )
@@ -107,23 +118,9 @@ append_lines <- function(table, lines) {
   if (length(lines)) write_bytes(table, as_lines(lines), "ab")
 }
 
-abort_log <- function(folder, cnd, call) {
-  abort_wrong(
-    "log", folder, call, 'The log cannot be written to "{folder}".',
-    x = "{conditionMessage(cnd)}",
-    i = "Give another folder as `log`."
-  )
-}
-
-warn_not_logged <- function(table, cnd) {
-  rlang::warn(
-    c(paste0("The log \"", table, "\" cannot be written; the training continues without it."),
-      x = conditionMessage(cnd)),
-    class = "gym_warning_log"
-  )
-}
-
 write_config <- function(file, settings) {
+  from <- unclass(settings$provenance)
+  from$started <- format(from$started, "%Y-%m-%dT%H:%M:%S%z")
   numbers <- c("iterations", "total_steps", "episodes", "target", "max_steps", "eval_every",
                "eval_steps", "eval_episodes", "seed")
   config <- c(
@@ -134,7 +131,7 @@ write_config <- function(file, settings) {
       policy = if (is.null(settings$policy)) "the learner's own" else policy_text(settings$policy)
     ),
     settings[numbers],
-    list(provenance = plain_provenance(settings$provenance))
+    list(provenance = from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))])
   )
   json <- with_decimal_point(jsonlite::toJSON(
     config, auto_unbox = TRUE, pretty = TRUE, null = "null", digits = NA, force = TRUE
@@ -143,12 +140,6 @@ write_config <- function(file, settings) {
 }
 
 as_lines <- function(lines) charToRaw(paste0(enc2utf8(lines), "\n", collapse = ""))
-
-plain_provenance <- function(from) {
-  from <- unclass(from)
-  from$started <- format(from$started, "%Y-%m-%dT%H:%M:%S%z")
-  from[setdiff(names(from), c("elapsed", "seed", "kwargs", "env_id"))]
-}
 
 # Renames "progress.csv" to "progress-1.csv", or to the first such name that is free.
 keep_as_earlier <- function(file) {

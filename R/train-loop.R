@@ -1,33 +1,18 @@
 # The loop that trains agents: ask the agent, play its candidates, tell it the results. A learner
 # plays by itself (train-learner.R). train-evaluation.R decides when training ends.
 
-#' Make the state of a training, which changes during training
-#'
-#' @return An environment. Between iterations, the elements in `kept_of_training` and the streams
-#'   are all that is needed to resume.
-#' @noRd
-new_state <- function(settings) {
-  generator <- new_generator(settings$seed)
-  rlang::env(
-    agent = settings$agent, iteration = 0L, steps = 0, history = list(), evaluations = list(),
-    episodes = list(), final = NULL, solved = FALSE, ended = FALSE,
-    streams = new_streams(settings$seed),
-    # Evaluations have their own streams, so that training does not depend on them.
-    evaluation_streams = new_streams(with_generator(generator, draw_seed())),
-    started = proc.time()[["elapsed"]], report = function(ended) NULL, log = function() NULL,
-    checkpoint = function(last = FALSE) NULL
-  )
-}
-
 #' Train until the end, an interrupt or an error; an error carries the finished part
-#' @param state As made by [new_state()], with an agent that has started.
+#' @param state As train_in() makes it, with an agent that has started.
 #' @param call The user's call.
 #' @return As [training_result()].
 #' @noRd
 run_training <- function(state, vector_env, settings, progress, call) {
   show <- training_progress(settings, state, progress)
   play <- function() {
-    evaluate_start(state, vector_env, settings)
+    # The untrained policy, if its episodes are sure to end.
+    limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
+    begins <- !state$iteration && !length(state$evaluations) && !is.null(limit)
+    if (begins && !settings$search) evaluate_for_curve(state, vector_env, settings)
     while (!is_over(settings, state)) {
       train_iteration(state, vector_env, settings, call)
       state$ended <- training_ends(state, vector_env, settings)
@@ -84,9 +69,17 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- state$agent
   if (settings$search) agent$candidates <- rounds_together(state, vector_env, settings)
   needs <- agent_needs(agent)
-  check_needs(needs, call)
-  asked <- asked_candidates(state, agent, call)
-  candidates <- asked$candidates
+  known <- c("returns", "moments", "trajectories")
+  if (!is.character(needs) || !all(needs %in% known)) {
+    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
+    abort_agent(needs, "agent_needs()", must, call)
+  }
+  # A behavior policy may be drawn.
+  candidates <- with_generator(state$streams$agent, agent_behavior(agent))
+  asked <- if (inherits(candidates, "gym_policy_network")) {
+    asked_weights(state, agent, length(stats::coef(candidates)), call)
+  }
+  if (!is.null(asked)) candidates <- new_candidates(candidates, asked)
   episodes <- agent_episodes(agent, settings$episodes)
   history <- new_history(count_candidates(candidates) %||% 1L, episodes, state$streams)
   if (!settings$search) history$draw_seeds <- draw_training_seeds
@@ -99,9 +92,13 @@ train_iteration <- function(state, vector_env, settings, call) {
     keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
     keep_next = "trajectories" %in% needs
   )
-  results <- candidate_results(history, asked$weights, call)
+  results <- candidate_results(history, asked, call)
   if ("trajectories" %in% needs) {
-    results$trajectories <- played_trajectories(history, vector_env)
+    # The steps of all candidates, episode after episode.
+    played <- episodes_table(history$batches, several = TRUE)
+    steps <- steps_in_order(history$batches, played, vector_env, next_observation = TRUE)
+    of_steps <- lapply(played[c("candidate", "episode")], `[`, steps$row)
+    results$trajectories <- c(of_steps, steps[-1L])
   }
   steps <- round(results$lengths * history$episodes)
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
@@ -112,19 +109,19 @@ train_iteration <- function(state, vector_env, settings, call) {
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 
-# The candidates of an iteration: networks with the weights that the agent asks for, or its behavior
-# policy if that has no weights.
-asked_candidates <- function(state, agent, call) {
-  # A behavior policy may be drawn.
-  policy <- with_generator(state$streams$agent, agent_behavior(agent))
-  if (!inherits(policy, "gym_policy_network")) {
-    return(list(candidates = policy))
-  }
+# The weights of the candidates, a row for each.
+asked_weights <- function(state, agent, count, call) {
   asked <- with_generator(state$streams$agent, agent_ask(agent))
   asked <- plain_numbers(asked, "agent_ask()", call)
-  check_asked(asked, policy, call)
+  if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
+    must <- paste("a numeric matrix with", count_of(count, "column"))
+    abort_agent(asked, "agent_ask()", must, call)
+  }
+  if (!all(is.finite(asked))) {
+    abort_agent(asked, "agent_ask()", "finite numbers", call)
+  }
   storage.mode(asked) <- "double"
-  list(candidates = new_candidates(policy, asked), weights = asked)
+  asked
 }
 
 # A search plays as many rounds in parallel as a batch of episodes has room for.
@@ -181,38 +178,11 @@ check_is_agent <- function(agent, method, call) {
   }
 }
 
-check_asked <- function(asked, policy, call) {
-  count <- length(stats::coef(policy))
-  if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
-    must <- paste("a numeric matrix with", count_of(count, "column"))
-    abort_agent(asked, "agent_ask()", must, call)
-  }
-  if (!all(is.finite(asked))) {
-    abort_agent(asked, "agent_ask()", "finite numbers", call)
-  }
-}
-
-check_needs <- function(needs, call) {
-  known <- c("returns", "moments", "trajectories")
-  if (!is.character(needs) || !all(needs %in% known)) {
-    must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
-    abort_agent(needs, "agent_needs()", must, call)
-  }
-}
-
 abort_agent <- function(value, method, must, call) {
   gym_abort(
     paste0("`", method, "` must return ", must, ", not ", describe_argument(value), "."),
     class = "gym_error_agent", value = value, call = call
   )
-}
-
-# The steps of all candidates, episode after episode.
-played_trajectories <- function(history, vector_env) {
-  episodes <- episodes_table(history$batches, several = TRUE)
-  steps <- steps_in_order(history$batches, episodes, vector_env, next_observation = TRUE)
-  row <- steps$row
-  c(list(candidate = episodes$candidate[row], episode = episodes$episode[row]), steps[-1L])
 }
 
 # The results of an agent's candidates. Those after the one that ended the search were not played.
@@ -262,7 +232,12 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
     } else {
       state$iteration + episodes %/% settings$episodes
     }
-    bar(finished, if (settings$search) best_note(state) else iteration_note(state))
+    best <- state$agent$best_return
+    bar(finished, if (settings$search) {
+      paste0("best mean return ", if (is.finite(best)) number_text(best) else "-", ", ")
+    } else {
+      iteration_note(state)
+    })
     elapsed <- proc.time()[["elapsed"]] - started
     told <<- told || inform_of_pace(finished - before, total - before, unit, elapsed)
   }
@@ -309,11 +284,6 @@ inform_of_pace <- function(finished, total, unit, elapsed) {
     )
   }
   tells
-}
-
-best_note <- function(state) {
-  best <- state$agent$best_return
-  paste0("best mean return ", if (is.finite(best)) number_text(best) else "-", ", ")
 }
 
 iteration_note <- function(state) {

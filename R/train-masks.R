@@ -17,60 +17,60 @@ with_masks <- function(vector_env, name, note, call) {
       i = 'Use a single environment, or one made by `gym_make()` with vectorization_mode "sync".'
     )
   }
-  vector_env[c("reset", "step")] <- masked_functions(env, vector_env, name, note, call)
+  space <- vector_env$observation_space
+  actions <- vector_env$action_space
+  if (is.null(env$num_envs)) {
+    # A single environment, with batches of one observation and one action.
+    single <- env
+    batched <- function(out) {
+      out$observation <- batch_of(space, list(out$observation))
+      out
+    }
+    env <- list(
+      num_envs = 1L, reset = function(...) batched(single$reset(...)),
+      step = function(action) batched(single$step(batch_value(actions, action, 1L)))
+    )
+  }
+  n <- env$num_envs
+  was_reset <- FALSE
+  vector_env$reset <- function(seeds, which = 1L) {
+    some <- was_reset && length(which) < n
+    seed <- rep(if (some) NA_real_ else seeds, length.out = n)
+    seed[which] <- seeds
+    resets <- if (some) list(mask = seq_len(n) %in% which)
+    out <- rlang::exec(env$reset, seed = seed, !!!resets, return_info = TRUE)
+    was_reset <<- TRUE
+    observation <- batch_rows(space, out$observation, which)
+    mask <- mask_in(out$info, name, n, actions, call)
+    if (!is.null(mask)) note(observation, mask[which, , drop = FALSE])
+    observation
+  }
+  vector_env$step <- function(action, which = 1L) {
+    count <- length(which)
+    out <- if (count < n) env$step(action, which = which) else env$step(action)
+    out$next_observation <- out$next_observation %||% out$observation
+    mask <- mask_in(out$info, name, count, actions, call)
+    if (is.null(mask)) {
+      has <- paste0('"', names(out$info), '"', collapse = ", ", recycle0 = TRUE)
+      abort_wrong(
+        "mask", name, call,
+        '`mask` names "{name}", but the environment\'s info has no such element.',
+        i = if (nzchar(has)) "It has {has}."
+      )
+    }
+    final <- mask_in(out$info$final_info, name, count, actions, call)
+    ended <- out$terminated | out$truncated
+    if (!is.null(final)) mask[ended, ] <- final[ended, ]
+    goes_on <- which(!out$terminated)
+    if (length(goes_on)) {
+      note(batch_rows(space, out$next_observation, goes_on), mask[goes_on, , drop = FALSE])
+    }
+    out
+  }
   # If the environment starts the next episode itself, its info would replace that of the last step.
   vector_env$begins_next <- FALSE
   vector_env$step_one <- NULL
   vector_env
-}
-
-masked_functions <- function(env, vector_env, name, note, call) {
-  space <- vector_env$observation_space
-  actions <- vector_env$action_space
-  if (is.null(env$num_envs)) env <- one_as_batch(env, space, actions)
-  n <- env$num_envs
-  was_reset <- FALSE
-  list(
-    reset = function(seeds, which = 1L) {
-      some <- was_reset && length(which) < n
-      seed <- rep(if (some) NA_real_ else seeds, length.out = n)
-      seed[which] <- seeds
-      resets <- if (some) list(mask = seq_len(n) %in% which)
-      out <- rlang::exec(env$reset, seed = seed, !!!resets, return_info = TRUE)
-      was_reset <<- TRUE
-      observation <- batch_rows(space, out$observation, which)
-      mask <- mask_in(out$info, name, n, actions, call)
-      if (!is.null(mask)) note(observation, mask[which, , drop = FALSE])
-      observation
-    },
-    step = function(action, which = 1L) {
-      count <- length(which)
-      out <- if (count < n) env$step(action, which = which) else env$step(action)
-      out$next_observation <- out$next_observation %||% out$observation
-      mask <- needed_mask(out$info, name, count, actions, call)
-      final <- mask_in(out$info$final_info, name, count, actions, call)
-      ended <- out$terminated | out$truncated
-      if (!is.null(final)) mask[ended, ] <- final[ended, ]
-      goes_on <- which(!out$terminated)
-      if (length(goes_on)) {
-        note(batch_rows(space, out$next_observation, goes_on), mask[goes_on, , drop = FALSE])
-      }
-      out
-    }
-  )
-}
-
-# A single environment, with batches of one observation and one action.
-one_as_batch <- function(env, space, actions) {
-  force(env)
-  batched <- function(out) {
-    out$observation <- batch_of(space, list(out$observation))
-    out
-  }
-  list(
-    num_envs = 1L, reset = function(...) batched(env$reset(...)),
-    step = function(action) batched(env$step(batch_value(actions, action, 1L)))
-  )
 }
 
 #' Read the mask in an info
@@ -94,19 +94,6 @@ mask_in <- function(info, name, n, actions, call) {
     )
   }
   matrix(mask != 0, n, count)
-}
-
-needed_mask <- function(info, name, n, actions, call) {
-  mask <- mask_in(info, name, n, actions, call)
-  if (is.null(mask)) {
-    has <- names(info)
-    abort_wrong(
-      "mask", name, call,
-      "`mask` names \"{name}\", but the environment's info has no such element.",
-      i = if (length(has)) 'It has {paste0("\\"", has, "\\"", collapse = ", ")}.'
-    )
-  }
-  mask
 }
 
 #' Keep a learner from taking masked actions again

@@ -64,12 +64,17 @@ memory_writer <- function(path, earlier = NULL) {
     if (!inherits(memory, "gym_memory") || is.null(memory$steps)) {
       return(agent)
     }
-    if (!is.null(earlier) && identical(key_of_checkpoint(path), key)) {
-      unlink(memory_files(path, earlier))
-      earlier <<- NULL
+    if (!is.null(earlier)) {
+      saved <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
+      if (identical(saved$training$agent$memory$key, key)) {
+        unlink(memory_files(path, earlier))
+        earlier <<- NULL
+      }
     }
-    # The file before these stays, in case a checkpoint could not be written.
-    remove_forgotten(path, key, count - 2 * memory$size, memory$size)
+    # The last two files stay, in case a checkpoint could not be written.
+    files <- memory_files(path, key)
+    after <- as.numeric(sub(".*-", "", files)) + 1
+    unlink(files[after * memory$size <= count - 2 * memory$size])
     first <- max(0, memory$count - memory$size) %/% memory$size
     if (count == 0 || !file.exists(memory_file(path, key, (count - 1) %/% memory$size))) {
       # Write the whole memory, even if somebody has removed the files.
@@ -89,11 +94,6 @@ memory_writer <- function(path, earlier = NULL) {
   }
 }
 
-key_of_checkpoint <- function(path) {
-  saved <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
-  saved$training$agent$memory$key
-}
-
 # Forgotten steps are not needed any more: zeros keep their place.
 append_memory <- function(memory, file, first, last) {
   numbers <- seq.int(first, last)
@@ -105,13 +105,6 @@ append_memory <- function(memory, file, first, last) {
   values <- memory$steps[, memory_columns(memory, numbers), drop = FALSE]
   values[, numbers <= memory$count - memory$size] <- 0
   write_bytes(file, writeBin(as.vector(values), raw(), endian = "little"), "ab")
-}
-
-# Removes files that have only steps up to this number.
-remove_forgotten <- function(path, key, last, size) {
-  files <- memory_files(path, key)
-  numbers <- as.numeric(sub(".*-", "", files))
-  unlink(files[(numbers + 1) * size <= last])
 }
 
 #' Read the memory of an agent from its files
@@ -128,7 +121,17 @@ restore_memory <- function(agent, path, call = NULL) {
     number <- first %/% memory$size
     end <- min(memory$count, (number + 1) * memory$size)
     file <- memory_file(path, memory$key, number)
-    values <- read_memory(file, end - number * memory$size, memory$width, call)
+    # Steps behind these were written after the checkpoint.
+    count <- (end - number * memory$size) * memory$width
+    if (!file.exists(file) || file.size(file) < 8 * count) {
+      gym_abort(
+        c(paste0("The memory that belongs to the checkpoint, \"", file,
+                 "\", is missing or damaged."),
+          i = "`resume = FALSE` starts again."),
+        class = c("gym_error_checkpoint", "gym_error_argument"), path = file, call = call
+      )
+    }
+    values <- matrix(readBin(file, "double", count, endian = "little"), memory$width)
     numbers <- seq.int(first + 1, end)
     steps[, memory_columns(memory, numbers)] <- values[, numbers - number * memory$size]
     first <- end
@@ -137,17 +140,4 @@ restore_memory <- function(agent, path, call = NULL) {
   agent$memory <- memory[names(new_memory(1))]
   class(agent$memory) <- "gym_memory"
   agent
-}
-
-# Reads the first steps of a file. Later ones were written after the checkpoint.
-read_memory <- function(file, count, width, call) {
-  bytes <- 8 * count * width
-  if (!file.exists(file) || file.size(file) < bytes) {
-    gym_abort(
-      c(paste0("The memory that belongs to the checkpoint, \"", file, "\", is missing or damaged."),
-        i = "`resume = FALSE` starts again."),
-      class = c("gym_error_checkpoint", "gym_error_argument"), path = file, call = call
-    )
-  }
-  matrix(readBin(file, "double", count * width, endian = "little"), width)
 }

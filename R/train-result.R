@@ -1,7 +1,7 @@
 # The result of a training: class gym_training.
 
 #' Make the result of a training
-#' @param state As made by [new_state()]; only finished iterations count.
+#' @param state As train_in() makes it; only finished iterations count.
 #' @noRd
 training_result <- function(settings, state, interrupted = FALSE) {
   search <- settings$search
@@ -12,7 +12,14 @@ training_result <- function(settings, state, interrupted = FALSE) {
         # A search has not found a policy that was never played.
         policy = if (!search || state$iteration > 0L) judged_policy(settings, state$agent),
         agent = state$agent,
-        solved = is_solved(settings, state),
+        solved = if (search) {
+          # By the tutorial's rule there is no final evaluation.
+          state$solved
+        } else if (has_target(settings)) {
+          reaches(state$final$mean_return, settings$target)
+        } else {
+          NA
+        },
         stopped_early = state$solved,
         history = history,
         evaluations = rows_table(state$evaluations, no_evaluations),
@@ -33,17 +40,6 @@ training_result <- function(settings, state, interrupted = FALSE) {
     ),
     class = c(if (search) "gym_search", "gym_training")
   )
-}
-
-is_solved <- function(settings, state) {
-  if (settings$search) {
-    # By the tutorial's rule there is no final evaluation.
-    state$solved
-  } else if (has_target(settings)) {
-    reaches(state$final$mean_return, settings$target)
-  } else {
-    NA
-  }
 }
 
 # Combines rows, lists or data frames, into a data frame; `none` is the one without rows.
@@ -108,27 +104,26 @@ training_lines <- function(x) {
       outcome, " ", count_of(nrow(x$history), if (search) "round" else "iteration"), ", ",
       count_of(x$steps, "step"), elapsed_text(x$elapsed), target
     ),
-    if (search) best_round_line(x),
+    if (search && !nrow(x$rounds)) {
+      "Ended before the first round was played to its end"
+    } else if (search) {
+      paste0("Best of ", count_of(nrow(x$rounds), "round"), ": round ", x$round, ", mean return ",
+             number_text(x$rounds$mean_return[[x$round]]), " in ",
+             count_of(nrow(x$episodes) / nrow(x$rounds), "episode"))
+    },
     if (is_exact(x$final)) {
+      apart <- x$rules$eval_steps %||% 0
       c(
         paste0("Expected return, by the model: ", number_text(x$final$mean_return),
                verdict_text(x)),
-        evaluations_line(x)
+        paste0("Evaluated ", count_of(length(unique(x$evaluations$iteration)), "time"),
+               ": eval_every ", number_text(x$rules$eval_every),
+               if (apart > 0) paste0(", at least ", count_of(apart, "step"), " apart"))
       )
     } else if (!is.null(x$final)) {
       paste0("Mean return in ", count_of(x$final$episodes, "fresh episode"), ": ",
              evaluation_text(x$final), verdict_text(x))
     }
-  )
-}
-
-# How many exact evaluations there were, and how often.
-evaluations_line <- function(x) {
-  apart <- x$rules$eval_steps %||% 0
-  paste0(
-    "Evaluated ", count_of(length(unique(x$evaluations$iteration)), "time"), ": eval_every ",
-    number_text(x$rules$eval_every),
-    if (apart > 0) paste0(", at least ", count_of(apart, "step"), " apart")
   )
 }
 

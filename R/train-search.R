@@ -63,15 +63,6 @@ as.data.frame.gym_search <- function(x, row.names = NULL, optional = FALSE, ...)
   x$episodes
 }
 
-best_round_line <- function(x) {
-  if (!nrow(x$rounds)) {
-    return("Ended before the first round was played to its end")
-  }
-  paste0("Best of ", count_of(nrow(x$rounds), "round"), ": round ", x$round, ", mean return ",
-         number_text(x$rounds$mean_return[[x$round]]), " in ",
-         count_of(nrow(x$episodes) / nrow(x$rounds), "episode"))
-}
-
 check_found <- function(object, call = rlang::caller_env()) {
   if (is.null(object$policy)) {
     abort_wrong(

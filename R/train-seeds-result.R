@@ -114,7 +114,15 @@ trainings_lines <- function(x) {
   c(
     paste0("Training in ", env_text(x), " by ", format(x$agent)),
     paste0("Policy: ", policy_text(x$trainings[[1L]]$policy)),
-    if (nrow(done) && has_target(x)) reached_lines(done, x$target),
+    if (nrow(done) && has_target(x)) {
+      interval <- wilson_interval(sum(done$reached), nrow(done))
+      c(
+        paste0("Reached the target ", number_text(x$target), " with ", sum(done$reached), " of ",
+               count_of(nrow(done), "seed"), " (",
+               interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")"),
+        paste0("Stopped early: ", sum(done$stopped_early), " of ", nrow(done))
+      )
+    },
     if (length(returns)) {
       paste0("Final mean returns: median ", number_text(stats::median(returns)), ", from ",
              number_text(min(returns)), " to ", number_text(max(returns)))
@@ -122,16 +130,5 @@ trainings_lines <- function(x) {
     paste0(if (any(table$interrupted)) "Interrupted after " else "Played ",
            count_of(nrow(done), "seed"), ", ", count_of(sum(table$steps), "step"),
            elapsed_text(x$elapsed))
-  )
-}
-
-reached_lines <- function(done, target) {
-  n <- nrow(done)
-  interval <- wilson_interval(sum(done$reached), n)
-  c(
-    paste0("Reached the target ", number_text(target), " with ", sum(done$reached), " of ",
-           count_of(n, "seed"), " (",
-           interval_text(interval[[1L]], interval[[2L]], text = percent_text), ")"),
-    paste0("Stopped early: ", sum(done$stopped_early), " of ", n)
   )
 }

@@ -39,7 +39,14 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
     }
   }
   train_all <- function(vector_env) {
-    if (settings$search) check_has_target(settings, vector_env, call)
+    # Without a target, no seed solves a search.
+    if (settings$search && is.null(training_target(settings, vector_env$spec))) {
+      abort_wrong(
+        "target", NULL, call,
+        "{environment_label(vector_env)} has no reward threshold, so a search needs a target.",
+        i = "Give the mean return that solves it as `target`."
+      )
+    }
     if (seeds_go_to_workers(vector_env, settings)) {
       return(train_in_futures(vector_env, runs, keep, call))
     }
@@ -53,50 +60,29 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
       }
     }
   }
-  interrupted <- keeping_trainings(
+  interrupted <- tryCatch(
     until_interrupted(
       in_env(train_all, settings$max_steps),
       "Interrupted after {finished} of {total} seed{?s}; the finished ones are returned.",
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
-    function() trainings, keep, result, settings$what, files, call
+    # An error carries the trainings so far, including the current one.
+    error = function(cnd) {
+      in_training <- inherits(cnd, "gym_error_training")
+      if (!length(trainings) && !in_training) {
+        rlang::cnd_signal(cnd)
+      }
+      finished <- count_of(length(trainings), "seed")
+      if (inherits(cnd$result, "gym_training")) keep(replace(cnd$result, "interrupted", TRUE))
+      abort_with_result(
+        if (in_training) cnd$parent %||% cnd else cnd, paste("The", settings$what), result(),
+        finished, unique(paste0("gym_error_", c(settings$what, "training"))), call,
+        if (!is.null(files$checkpoint)) "After a fix, the same call resumes from the checkpoints."
+      )
+    }
   )
   result(interrupted)
-}
-
-# Without a target, no seed solves a search.
-check_has_target <- function(settings, vector_env, call) {
-  if (is.null(training_target(settings, vector_env$spec))) {
-    abort_wrong(
-      "target", NULL, call,
-      "{environment_label(vector_env)} has no reward threshold, so a search needs a target.",
-      i = "Give the mean return that solves it as `target`."
-    )
-  }
-}
-
-# An error carries the trainings so far, including the current one.
-keeping_trainings <- function(code, trained, keep, result, what, files, call) {
-  tryCatch(code, error = function(cnd) {
-    in_training <- inherits(cnd, "gym_error_training")
-    if (!length(trained()) && !in_training) {
-      rlang::cnd_signal(cnd)
-    }
-    finished <- count_of(length(trained()), "seed")
-    if (inherits(cnd$result, "gym_training")) {
-      begun <- cnd$result
-      begun$interrupted <- TRUE
-      keep(begun)
-    }
-    abort_with_result(
-      if (in_training) cnd$parent %||% cnd else cnd, paste("The", what), result(), finished,
-      unique(paste0("gym_error_", c(what, "training"))), call,
-      if (!is.null(files$checkpoint)) {
-        "After a fix, the same call resumes from the checkpoints."
-      }
-    )
-  })
 }
 
 # Show each message once for all seeds. The error of a run of a sweep is its result.
