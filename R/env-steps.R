@@ -100,12 +100,12 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
       gym_error_connection = function(cnd) check_ended
     )
   }
-  if (is.null(instance$num_envs)) {
-    if (isTRUE(instance$done)) {
-      # NA: the episode is over, and the warning has been given.
+  # NA: the episode is over, and the warning has been given.
+  if (is.null(instance$num_envs) && !is.na(instance$done)) {
+    if (instance$done) {
       instance$done <- NA
       warn_step_after_end(paste("Instance", instance$id, "of", instance$spec$id), call)
-    } else if (isFALSE(instance$done)) {
+    } else {
       instance$done <- result$done
     }
   }
