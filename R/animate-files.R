@@ -17,7 +17,14 @@ write_gif <- function(pngs, file, delays, width = NULL) {
     pixels <- magick::image_data(image, "rgb")
     # A part keeps its place and its delay, and stays until the next one covers it.
     image <- magick::image_animate(image, delay = delays[[i]], dispose = "none")
-    parts[[i]] <- crop_image(image, changed_part(before, pixels))
+    part <- changed_part(before, pixels)
+    area <- magick::geometry_area(part$width, part$height, part$x, part$y)
+    # The colour space of GIF files. From any other one ImageMagick would choose colours again, with
+    # dithering, in 128 MB and a tenth of a second per frame.
+    parts[[i]] <- magick::image_quantize(
+      magick::image_crop(image, area, repage = FALSE), max = 256, colorspace = "sRGB",
+      dither = FALSE
+    )
     before <- pixels
   }
   gif <- magick::image_write(magick::image_join(parts), format = "gif")
@@ -42,15 +49,6 @@ changed_part <- function(before, now) {
   list(x = x[[1L]] - 1L, y = y[[1L]] - 1L, width = diff(x) + 1L, height = diff(y) + 1L)
 }
 
-# The colour space of GIF files. From any other one ImageMagick would choose colours again, with
-# dithering, in 128 MB and a tenth of a second per frame.
-crop_image <- function(image, part) {
-  area <- magick::geometry_area(part$width, part$height, part$x, part$y)
-  magick::image_quantize(
-    magick::image_crop(image, area, repage = FALSE), max = 256, colorspace = "sRGB", dither = FALSE
-  )
-}
-
 # MP4 -------------------------------------------------------------------------------------
 
 # Episodes as MP4 files, written by the package av or by the program ffmpeg, which the server's
@@ -61,7 +59,7 @@ crop_image <- function(image, part) {
 #' @inheritParams write_gif
 #' @return The size of the frames in pixels, width and height, which are even in most videos.
 #' @noRd
-write_mp4 <- function(pngs, file, fps, width = NULL, call = rlang::caller_env(2)) {
+write_mp4 <- function(pngs, file, fps, width = NULL, call) {
   folder <- temporary_file()
   dir.create(folder)
   on.exit(unlink(folder, recursive = TRUE))
@@ -83,25 +81,12 @@ write_mp4 <- function(pngs, file, fps, width = NULL, call = rlang::caller_env(2)
     "-i", file.path(folder, "%06d.png"), "-vf", filter, file
   ), timeout = Inf)
   if (!identical(run$status, 0L)) {
-    gym_abort(
-      c("ffmpeg wrote no video.", x = run$stderr), class = "gym_error_argument", argument = "file",
-      value = file, call = call
-    )
+    abort_misuse("file", file, call, "ffmpeg wrote no video.", x = run$stderr)
   }
   size
 }
 
 is_av_there <- function() requireNamespace("av", quietly = TRUE)
-
-check_writes_mp4 <- function(call) {
-  if (!is_av_there() && is.null(find_ffmpeg())) {
-    gym_abort(
-      c("Writing an MP4 file requires the package av or the program ffmpeg.",
-        i = "`install.packages(\"av\")` installs the package; a .gif file needs neither."),
-      class = "gym_error_argument", argument = "file", call = call
-    )
-  }
-}
 
 # The system's program, or that of the Python that runs, or would run, the session's server.
 find_ffmpeg <- function() {

@@ -53,11 +53,9 @@ animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 #' @export
 animate.default <- function(x, file = NULL, fps = NULL, ...) {
   if (is_given_by_id(x) || is_playable(x)) {
-    gym_abort(
-      c("`animate()` shows an episode that was played, and `x` is an environment.",
-        i = "`animate(rollout(env, policy, frames = TRUE))` plays one."),
-      class = "gym_error_argument", argument = "x", value = x, call = rlang::current_env()
-    )
+    abort_misuse("x", x, rlang::current_env(),
+                 "`animate()` shows an episode that was played, and `x` is an environment.",
+                 i = "`animate(rollout(env, policy, frames = TRUE))` plays one.")
   }
   abort_argument(x, "a rollout, a search, a training or a policy", "x", rlang::current_env())
 }
@@ -88,12 +86,10 @@ animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, wid
 animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
-  file <- check_animation(file, fps, width, every)
-  played <- naming_own_call(rlang::inject(rollout(
-    x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
-    !!!x$kwargs
-  )), "rollout")
-  new_animation(episode_frames(played), file, fps, width, every)
+  rlang::exec(
+    animate_episode, file, fps, width, every, x$env, x$policy, max_steps = x$max_steps, seed = seed,
+    client = client, !!!x$kwargs, call = rlang::current_env()
+  )
 }
 
 #' @rdname animate
@@ -101,11 +97,9 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
 animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL, max_steps = NULL,
                                width = NULL, every = NULL, client = gym_client()) {
   check_dots_empty(...)
-  file <- check_animation(file, fps, width, every)
-  played <- naming_own_call(
-    rollout(env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE), "rollout"
+  animate_episode(
+    file, fps, width, every, env, x, max_steps = max_steps, seed = seed, client = client
   )
-  new_animation(episode_frames(played), file, fps, width, every)
 }
 
 #' @rdname animate
@@ -116,21 +110,17 @@ animate.function <- animate.gym_policy
 # the two packages was attached last. They are registered when gganimate is loaded, so it need not
 # be installed.
 register_with_gganimate <- function() {
-  if (isNamespaceLoaded("gganimate")) {
-    register_animate(asNamespace("gganimate"))
-  }
-  setHook(
-    packageEvent("gganimate", "onLoad"),
-    function(...) register_animate(asNamespace("gganimate"))
-  )
+  register <- function(...) register_animate(asNamespace("gganimate"))
+  if (isNamespaceLoaded("gganimate")) register()
+  setHook(packageEvent("gganimate", "onLoad"), register)
 }
 
 # `home`: the environment of the generic function.
 register_animate <- function(home) {
-  registerS3method("animate", "gym_rollout", animate.gym_rollout, envir = home)
-  registerS3method("animate", "gym_search", animate.gym_search, envir = home)
-  registerS3method("animate", "gym_training", animate.gym_training, envir = home)
-  registerS3method("animate", "gym_policy", animate.gym_policy, envir = home)
+  for (class in c("gym_rollout", "gym_search", "gym_training", "gym_policy")) {
+    method <- get(paste0("animate.", class), topenv())
+    registerS3method("animate", class, method, envir = home)
+  }
 }
 
 # Checks everything before an episode is played. Returns the file's absolute path.
@@ -146,7 +136,13 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
       abort_argument(file, "in a folder that exists", "file", call)
     }
   }
-  if (is_mp4(file)) check_writes_mp4(call) else check_suggested("magick", "write a GIF", call)
+  if (!is_mp4(file)) {
+    check_suggested("magick", "write a GIF", call)
+  } else if (!is_av_there() && is.null(find_ffmpeg())) {
+    abort_misuse("file", file, call,
+                 "Writing an MP4 file requires the package av or the program ffmpeg.",
+                 i = "`install.packages(\"av\")` installs the package; a .gif file needs neither.")
+  }
   if (!is.null(file)) absolute_path(file)
 }
 
@@ -157,46 +153,46 @@ is_mp4 <- function(file) !is.null(file) && endsWith(tolower(file), ".mp4")
 episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_env()) {
   row <- episode_row(x, episode, candidate, call)
   if (is.null(x$frames)) {
-    gym_abort(
-      c("This rollout was played without frames.",
-        i = "`rollout(..., frames = TRUE)` keeps them."),
-      class = "gym_error_argument", argument = "x", value = x, call = call
-    )
+    abort_misuse("x", x, call, "This rollout was played without frames.",
+                 i = "`rollout(..., frames = TRUE)` keeps them.")
   }
   x$frames[[row]]
 }
 
-new_animation <- function(frames, file, fps, width, every) {
-  fps <- fps %||% frame_rate(frames)
+# Plays an episode and makes an animation of it; `...` are arguments of rollout().
+animate_episode <- function(file, fps, width, every, ..., call = rlang::caller_env()) {
+  file <- check_animation(file, fps, width, every, call)
+  played <- naming_own_call(rollout(..., frames = TRUE), "rollout", call)
+  new_animation(episode_frames(played), file, fps, width, every, call)
+}
+
+new_animation <- function(frames, file, fps, width, every, call = rlang::caller_env()) {
+  # The environment's metadata, which may be anything, has the number of frames per second.
+  own <- attr(frames, "fps")
+  fps <- fps %||% if (is_number(own) && own > 0) own else 30
   video <- is_mp4(file)
   plan <- animation_plan(length(frames), fps, every, if (video) Inf else fastest_fps)
   pngs <- unclass(frames)[plan$steps + 1L]
   # An interrupt leaves an existing file as it was.
   written <- temporary_file(fileext = if (video) ".mp4" else ".gif")
   size <- if (video) {
-    write_mp4(pngs, written, fps / (every %||% 1), width)
+    write_mp4(pngs, written, fps / (every %||% 1), width, call)
   } else {
     write_gif(pngs, written, plan$delays, width)
   }
   if (!is.null(file)) {
-    move_animation(written, file)
+    if (!suppressWarnings(file.copy(written, file, overwrite = TRUE))) {
+      abort_argument(file, "a file that can be written", "file", call)
+    }
+    unlink(written)
   }
   structure(
     list(
-      file = file %||% written,
-      steps = plan$steps,
-      delays = plan$delays,
-      size = size,
+      file = file %||% written, steps = plan$steps, delays = plan$delays, size = size,
       stills = pick_stills(frames, 8L)
     ),
     class = "gym_animation"
   )
-}
-
-# The environment's metadata, which may be anything, has the number of frames per second.
-frame_rate <- function(frames) {
-  fps <- attr(frames, "fps")
-  if (is_number(fps) && fps > 0) fps else 30
 }
 
 #' Plan which frames to show, and for how long
@@ -205,17 +201,7 @@ frame_rate <- function(frames) {
 #'   second, rounded so that errors do not add up.
 #' @noRd
 animation_plan <- function(n, fps, every = NULL, fastest = fastest_fps) {
-  every <- shown_every(every, fps, fastest)
-  steps <- unique(as.integer(c(seq(0, n - 1, by = every), n - 1)))
-  delays <- diff(round(100 * steps / fps))
-  list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest), 65535)))
-}
-
-# Browsers slow down animations with more frames a second.
-fastest_fps <- 50
-
-# Show one in this many frames: at least so many that the speed can be kept.
-shown_every <- function(every, fps, fastest) {
+  # Show one in this many frames: at least so many that the speed can be kept.
   least <- max(1, ceiling(fps / fastest))
   if (!is.null(every) && every < least) {
     rlang::inform(
@@ -225,15 +211,14 @@ shown_every <- function(every, fps, fastest) {
       class = "gym_message_every"
     )
   }
-  max(every, least)
+  every <- max(every, least)
+  steps <- unique(as.integer(c(seq(0, n - 1, by = every), n - 1)))
+  delays <- diff(round(100 * steps / fps))
+  list(steps = steps, delays = as.integer(pmin(pmax(c(delays, 100), 100 / fastest), 65535)))
 }
 
-move_animation <- function(written, file, call = rlang::caller_env(2)) {
-  if (!suppressWarnings(file.copy(written, file, overwrite = TRUE))) {
-    abort_argument(file, "a file that can be written", "file", call)
-  }
-  unlink(written)
-}
+# Browsers slow down animations with more frames a second.
+fastest_fps <- 50
 
 # Showing it ------------------------------------------------------------------------
 

@@ -2,19 +2,14 @@
 # environment (https://gymnasium.farama.org/environments/).
 
 action_meanings <- list(
-  Acrobot = c("torque -1", "no torque", "torque +1"),
-  Blackjack = c("stick", "hit"),
-  CartPole = c("push left", "push right"),
-  CliffWalking = c("up", "right", "down", "left"),
+  Acrobot = c("torque -1", "no torque", "torque +1"), Blackjack = c("stick", "hit"),
+  CartPole = c("push left", "push right"), CliffWalking = c("up", "right", "down", "left"),
   CliffWalkingSlippery = c("up", "right", "down", "left"),
-  FrozenLake = c("left", "down", "right", "up"),
-  FrozenLake8x8 = c("left", "down", "right", "up"),
+  FrozenLake = c("left", "down", "right", "up"), FrozenLake8x8 = c("left", "down", "right", "up"),
   LunarLander = c("no engine", "left engine", "main engine", "right engine"),
   LunarLanderContinuous = c("main engine", "side engines"),
-  MountainCar = c("push left", "no push", "push right"),
-  MountainCarContinuous = "force",
-  Pendulum = "torque",
-  Taxi = c("south", "north", "east", "west", "pick up", "drop off")
+  MountainCar = c("push left", "no push", "push right"), MountainCarContinuous = "force",
+  Pendulum = "torque", Taxi = c("south", "north", "east", "west", "pick up", "drop off")
 )
 
 #' Find the meanings of an environment's actions
@@ -51,19 +46,17 @@ action_parts <- function(env_id, n) {
 #' @noRd
 numbered_actions <- function(instance, action, call) {
   space <- instance$single_action_space
-  if (!is.character(action) || !inherits(space, "gym_space_discrete")) {
-    return(action)
-  }
-  meaning <- action_meaning(instance$spec$id, space$n)
+  named <- is.character(action) && inherits(space, "gym_space_discrete")
+  meaning <- if (named) action_meaning(instance$spec$id, space$n)
   if (is.null(meaning)) {
     return(action)
   }
   number <- match(sub("^[0-9]+: ", "", action), meaning)
   if (anyNA(number)) {
+    unknown <- describe_value(action[is.na(number)][[1L]])
     names <- action_names(instance$spec$id, space$n, space$start)
     gym_abort(
-      c(paste0("There is no action ", describe_value(action[is.na(number)][[1L]]), " in ",
-               instance$spec$id, "."),
+      c(paste0("There is no action ", unknown, " in ", instance$spec$id, "."),
         i = paste0("Its actions: ", toString(names), ".")),
       class = "gym_error_space", space = space, value = action, path = "", call = call
     )
@@ -82,7 +75,19 @@ numbered_actions <- function(instance, action, call) {
 #' @noRd
 action_by_name <- function(space, action, env_id, call) {
   if (is.list(action)) {
-    return(action_parts_by_name(space, action, env_id, call))
+    n <- length(space$spaces)
+    given <- names(action)
+    # check_value() refuses other keys.
+    if (!has_parts(space) || length(action) != n || !all(names(space$spaces) %in% given)) {
+      return(action)
+    }
+    if (is.null(names(space$spaces)) && !is.null(given)) {
+      forms <- list(space$names, part_columns("action", space$names %||% seq_len(n)))
+      at <- places_of_names(given, forms)
+      if (is.null(at)) abort_action_names(space, action, given, forms, call)
+      action <- unname(action[at])
+    }
+    return(map_parts(space, action_by_name, in_order(space, action), list(NULL), list(call)))
   }
   rows <- length(dim(action)) == 2L
   given <- if (rows) colnames(action) else names(action)
@@ -96,22 +101,6 @@ action_by_name <- function(space, action, env_id, call) {
   at <- places_of_names(given, forms, labels = rows && is.null(own))
   if (is.null(at)) abort_action_names(space, action, given, forms, call)
   unname(if (rows) action[, at, drop = FALSE] else action[at])
-}
-
-action_parts_by_name <- function(space, action, env_id, call) {
-  n <- length(space$spaces)
-  given <- names(action)
-  # check_value() refuses other keys.
-  if (!has_parts(space) || length(action) != n || !all(names(space$spaces) %in% given)) {
-    return(action)
-  }
-  if (is.null(names(space$spaces)) && !is.null(given)) {
-    forms <- list(space$names, part_columns("action", space$names %||% seq_len(n)))
-    at <- places_of_names(given, forms)
-    if (is.null(at)) abort_action_names(space, action, given, forms, call)
-    action <- unname(action[at])
-  }
-  map_parts(space, action_by_name, in_order(space, action), list(NULL), list(call))
 }
 
 #' Find the places of known names among given ones

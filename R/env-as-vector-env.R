@@ -90,7 +90,8 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_count(num_workers, min = 0, allow_null = TRUE)
   if (is_registered(x)) {
     check_for_r(x, list(num_workers = num_workers))
-    return(registered_vector_env(x, num_envs, list(...), max_envs, frames))
+    env <- make_registered(x, list(...), rlang::current_env())
+    return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
   }
   call <- rlang::caller_env()
   arguments <- list(...)
@@ -107,7 +108,13 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
     list(env = make(NULL))
   } else {
     own <- arguments[!rlang::names2(arguments) %in% how_made()]
-    described <- known_description(client, without_transforms(x), own, call)
+    # The same environment without the wrappers that are applied in R.
+    inside <- if (calls_r(x)) {
+      with_wrappers(x$env_id, split_wrappers(x$wrappers, NULL)$server)
+    } else {
+      x
+    }
+    described <- known_description(client, inside, own, call)
     make_sub_envs(make, described, num_envs, num_workers, max_envs, call)
   }
   env <- made$env
@@ -133,228 +140,235 @@ as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frame
 # Frames are kept with one sub-environment, which plays one episode after the other.
 check_one_framed <- function(num_envs, frames, call = rlang::caller_env()) {
   if (frames && isTRUE(num_envs > 1)) {
-    gym_abort(
-      c(paste0("`num_envs` must be 1 to keep frames, not ", num_envs, "."),
-        i = "Leave it out, or leave out `frames = TRUE`."),
-      class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
-    )
+    abort_misuse("num_envs", num_envs, call, "`num_envs` must be 1 to keep frames, not {num_envs}.",
+                 i = "Leave it out, or leave out `frames = TRUE`.")
   }
 }
 
 check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env()) {
   given <- c(if (!is.null(num_envs)) "num_envs", names(arguments), if (length(arguments)) "...")
   if (length(given)) {
-    gym_abort(
-      c(paste0("`", given[[1L]], "` is for an environment given by its id, but this ",
-               environment_label(env), " was made before."),
-        i = did_you_mean(given[[1L]], arguments_of(passed_on_by(given[[1L]]))) %||%
-          "Give its id instead, or pass the argument to `gym_make()`."),
-      class = "gym_error_argument", argument = given[[1L]], call = call
-    )
+    near <- did_you_mean(given[[1L]], arguments_of(passed_on_by(given[[1L]])))
+    abort_misuse(given[[1L]], NULL, call,
+                 "`{given[[1L]]}` is for an environment given by its id, but this
+                  {environment_label(env)} was made before.",
+                 i = near %||% "Give its id instead, or pass the argument to `gym_make()`.")
   }
 }
 
 # A failure to close must not lose the results.
 close_or_warn <- function(env) {
-  tryCatch(
-    env$close(),
-    gym_error = function(cnd) {
-      rlang::warn(
-        c("The environment could not be closed.", x = conditionMessage(cnd)),
-        class = "gym_warning_close"
-      )
-    }
-  )
+  tryCatch(env$close(), gym_error = function(cnd) {
+    rlang::warn(c("The environment could not be closed.", x = conditionMessage(cnd)),
+                class = "gym_warning_close")
+  })
 }
 
-#' Construct a vector environment, the one thing that everything plays
-#'
-#' The arguments are its elements. [as_vector_env()] says what the first ones promise; those without
-#' a default are always there. Play adds `call`, the user's call, which errors name, and `recipe`,
-#' see [environment_recipe()]. Models add `model`, `possible` and `endless`.
-#' @param reset,step `NULL` only with `description`.
-#' @param step_one If there is one sub-environment: a function of one action that returns a step.
-#' @param guard If that is in R: a function that evaluates many such steps and adds the place to
-#'   their errors.
-#' @param description What a server needs to play whole episodes itself, see [describe_env()]; it
-#'   then also has `known`, what is known about the environment, and `make_stepped()`, which makes
-#'   the environment that R steps.
+# Making one from an id --------------------------------------------------------------------
+
+# The number of sub-environments of an environment made from its id.
+#
+# The rule depends on the environment and the number of episodes, never on cores, workers or time,
+# so that a seed gives the same results everywhere. Many sub-environments share the cost of a
+# message and of calling the policy. Too many make large messages, and most of them wait while the
+# last episodes of a batch end.
+
+entry_point_sub_envs <- 256L
+most_sub_envs <- 256L
+fewest_sub_envs <- 16L
+
+# The most bytes for the observations of all sub-environments, if there are more than 16.
+most_observation_bytes <- 2^20
+
+# Fewer episodes than this do not use worker processes.
+few_episodes <- 32L
+
+#' Choose the number of sub-environments with their own seeds
+#' @return A power of two, an integer.
 #' @noRd
-new_vector_env <- function(observation_space, action_space, spec, num_envs, batch_size, one_seed,
-                           reset = NULL, step = NULL, step_bare = NULL, begins_next = FALSE,
-                           frame = NULL, remembers = character(), env = NULL, client = NULL,
-                           close = function(wait = TRUE) invisible(), step_one = NULL,
-                           guard = NULL, description = NULL) {
-  structure(mget(names(formals())), class = "gym_vector_env")
+count_sub_envs <- function(observation_bytes) {
+  room <- 2^floor(log2(most_observation_bytes / max(observation_bytes, 1)))
+  as.integer(min(most_sub_envs, max(fewest_sub_envs, room)))
 }
 
-# Seeing one as a vector environment ---------------------------------------------------
+# The size of an observation in a message. Only arrays, which may be large, are counted.
+observation_bytes <- function(space) {
+  if (has_parts(space)) {
+    sum(vapply(space$spaces, observation_bytes, 0))
+  } else if (inherits(space, "gym_space_array")) {
+    bits <- suppressWarnings(as.numeric(sub("^[a-z]+", "", space$dtype)))
+    prod(space$shape) * if (is.na(bits)) 1 else bits / 8
+  } else {
+    0
+  }
+}
 
-#' Convert an environment that was made before to a vector environment
+#' Make an environment with sub-environments, or without any if the server cannot make them
 #'
-#' @param batch_size The number of episodes in a batch if each sub-environment has its own seed;
-#'   `NULL` to derive it from the number of sub-environments.
-#' @return As [as_vector_env()].
+#' @param make A function that makes it, of the number of sub-environments and how they run.
+#' @param described As returned by [known_description()]. A server that does not report the size of
+#'   observations refuses more sub-environments than it can make.
+#' @return A list: `env`, the environment, and `batch_size`, the number of episodes in a batch if
+#'   each sub-environment has its own seed.
 #' @noRd
-vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::caller_env()) {
-  parts <- if (is.null(env$num_envs)) {
-    single_env(env)
-  } else if (identical(env$vectorization_mode, "vector_entry_point")) {
-    check_ended_can_step(env, call)
-    joint_sub_envs(env)
-  } else {
-    independent_sub_envs(env)
-  }
-  parts$batch_size <- if (parts$one_seed || is.null(env$num_envs)) {
-    parts$num_envs
-  } else {
-    batch_size %||% episodes_of_batch(parts$num_envs)
-  }
-  if (frames) {
-    check_draws(env, call)
-    parts$frame <- function() png_frame(env$client, env$instance_id, call)
-    # The last frame of an episode is drawn before the next one begins.
-    parts$begins_next <- FALSE
-  }
-  rlang::exec(
-    new_vector_env, !!!parts, spec = env$spec, remembers = remembering(env$spec$wrappers),
-    env = env, client = env$client
-  )
-}
-
-# The number of episodes in a batch for sub-environments with their own seeds. With four episodes
-# each, few sub-environments are idle while the last episodes end. With a single one, an interrupt
-# loses no finished episode.
-episodes_of_batch <- function(num_envs) {
-  as.integer(if (num_envs == 1L) 1L else 4L * num_envs)
-}
-
-# An environment without sub-environments plays one episode after the other.
-single_env <- function(env) {
-  observed <- env$observation_space
-  actions <- env$action_space
-  step_one <- function(action) {
-    out <- take_step(env, 1L, action)
-    out$observation <- out$next_observation <- batch_of(observed, list(out$observation))
-    out
-  }
-  list(
-    observation_space = observed, action_space = actions, num_envs = 1L, one_seed = FALSE,
-    reset = function(seeds, which = 1L) batch_of(observed, list(first_observation(env, seeds))),
-    step = function(action, which = 1L) step_one(batch_value(actions, action, 1L)),
-    step_one = step_one
-  )
-}
-
-# With "sync" and "async" each sub-environment is an environment with its own seed, and only those
-# that play are stepped. Only a server's environments have `num_workers`; others need not be able to
-# start an episode themselves.
-independent_sub_envs <- function(env) {
-  n <- env$num_envs
-  space <- env$single_observation_space
-  # The first reset is for all, because none has an episode yet.
-  was_reset <- FALSE
-  reset <- function(seeds, which) {
-    some <- was_reset && length(which) < n
-    seed <- rep(if (some) NA_real_ else seeds, length.out = n)
-    seed[which] <- seeds
-    observation <- if (some) {
-      first_observation(env, seed, mask = seq_len(n) %in% which)
-    } else {
-      first_observation(env, seed)
+make_sub_envs <- function(make, described, num_envs, num_workers, max_envs, call) {
+  own_implementation <- isTRUE(described$one_seed)
+  if (own_implementation) {
+    check_no_workers(num_workers, call)
+    own <- if_supported(
+      make(num_envs %||% entry_point_sub_envs, vectorization_mode = "vector_entry_point")
+    )
+    if (!is.null(own)) {
+      return(list(env = own))
     }
-    was_reset <<- TRUE
-    batch_rows(space, observation, which)
   }
-  step <- function(action, which) {
-    out <- take_step(env, length(which), action, if (length(which) < n) which)
-    out$next_observation <- out$next_observation %||% out$observation
-    out
-  }
-  begins_next <- !is.null(env$num_workers) && identical(env$autoreset_mode, "SameStep")
-  list(
-    observation_space = space, action_space = env$single_action_space, num_envs = n,
-    one_seed = FALSE, reset = reset, begins_next = begins_next, step = step,
-    step_bare = if (begins_next && is_server_env(env)) bare_stepper(env)
-  )
-}
-
-# Makes the function `step_bare()` of sub-environments that rest after their last episode. Those
-# that were stepped before are stepped along, and their results ignored: another set needs a new
-# request, which takes time to prepare. When fewer than half of them still play, the others are left
-# out.
-bare_stepper <- function(env) {
-  n <- env$num_envs
-  actions <- env$single_action_space
-  stepped <- NULL
-  function(action, which) {
-    row <- match(which, stepped)
-    if (anyNA(row) || 2L * length(which) <= length(stepped)) {
-      stepped <<- which
-      row <- seq_along(which)
-    }
-    count <- length(stepped)
-    along <- length(which) < count
-    if (along) action <- actions_of_all(actions, action, row, count)
-    out <- take_step(env, count, action, if (count < n) stepped, finals = FALSE)
-    if (along) rows_of_step(env$single_observation_space, out, row) else out
-  }
-}
-
-# Some rows of the result of a step.
-rows_of_step <- function(space, out, row) {
-  # The two are nearly always the same object, which identical() detects at once.
-  same <- identical(out$observation, out$next_observation)
-  observation <- batch_rows(space, out$observation, row)
-  list(
-    observation = observation, reward = out$reward[row], terminated = out$terminated[row],
-    truncated = out$truncated[row],
-    next_observation = if (same) observation else batch_rows(space, out$next_observation, row)
-  )
-}
-
-# With "vector_entry_point" all sub-environments share one generator and one seed. All are always
-# stepped, including those whose episode has ended; their results are ignored.
-joint_sub_envs <- function(env) {
-  n <- env$num_envs
-  observed <- env$single_observation_space
-  actions <- env$single_action_space
-  list(
-    observation_space = observed, action_space = actions, num_envs = n, one_seed = TRUE,
-    reset = function(seeds, which = NULL) first_observation(env, seeds),
-    step = function(action, which) {
-      out <- take_step(env, n, actions_of_all(actions, action, which, n))
-      out$next_observation <- out$next_observation %||% out$observation
-      if (length(which) < n) {
-        return(rows_of_step(observed, out, which))
-      }
-      out[c("observation", "reward", "terminated", "truncated", "next_observation")]
-    }
-  )
-}
-
-# The actions of all sub-environments: those that have ended repeat the action of the first that
-# plays.
-actions_of_all <- function(space, action, which, n) {
-  if (length(which) == n) {
-    return(action)
-  }
-  row <- rep(1L, n)
-  row[which] <- seq_along(which)
-  batch_rows(space, action, row)
-}
-
-check_ended_can_step <- function(env, call) {
-  if (identical(env$autoreset_mode, "Disabled")) {
-    gym_abort(
-      c(
-        paste0("Episodes of different length cannot be played in ", environment_label(env),
-               " made with vectorization_mode \"", env$vectorization_mode,
-               "\" and autoreset_mode \"Disabled\": all of its sub-environments are stepped ",
-               "together, and one that has ended takes no step."),
-        i = "Make it with autoreset_mode \"NextStep\", or with vectorization_mode \"sync\"."
-      ),
-      class = "gym_error_argument", argument = "env", value = env, call = call
+  # Sub-environments with their own seeds. A vector implementation does not use workers.
+  make_seeded <- function(n, workers) {
+    make(
+      n, num_workers = workers, autoreset_mode = "SameStep",
+      vectorization_mode = if (own_implementation || is.null(described)) "sync"
     )
   }
+  full <- num_envs %||% count_sub_envs(observation_bytes(described$observation_space))
+  # There are no more sub-environments than episodes. Without a number the server chooses the
+  # workers.
+  workers <- num_workers %||% if (max_envs < few_episodes) 0L
+  env <- if (!is.null(num_envs)) {
+    # A single environment steps in half the time of one with a single sub-environment.
+    if (num_envs == 1 && is.null(num_workers)) make(NULL) else make_seeded(num_envs, workers)
+  }
+  for (n in if (is.null(num_envs)) counts_to_try(min(max_envs, full))) {
+    env <- env %||% if_supported(make_seeded(n, if (!is.null(workers)) min(workers, n)))
+  }
+  list(env = env %||% make(NULL), batch_size = episodes_of_batch(full))
 }
+
+# The server may refuse this many; then try fewer.
+counts_to_try <- function(n) {
+  unique(c(n, Filter(function(fewer) fewer > 1 && fewer < n, c(n %/% 4, fewest_sub_envs))))
+}
+
+check_no_workers <- function(num_workers, call) {
+  if (isTRUE(num_workers > 0)) {
+    abort_misuse("num_workers", num_workers, call,
+                 "`num_workers = {num_workers}` has no effect on an environment with its own vector
+                  implementation, which plays all sub-environments in one process.",
+                 i = "Leave it out.")
+  }
+}
+
+# Codes of errors that may disappear with fewer sub-environments or none.
+fewer_sub_envs_codes <- c("not_supported", "too_much_memory", "unsupported_space")
+
+# Evaluates code that makes an environment. NULL if the server cannot make such sub-environments, or
+# not that many.
+if_supported <- function(code) {
+  tryCatch(code, gym_error_http = function(cnd) {
+    if (!isTRUE(cnd$code %in% fewer_sub_envs_codes)) rlang::cnd_signal(cnd)
+  })
+}
+
+# A server's description of an environment given by its id: its spaces and its limits. This does not
+# make an instance.
+
+#' Describe an environment whose episodes a server plays itself
+#'
+#' The server is asked once for each environment.
+#' @param env_id,num_envs,frames,client As for [as_vector_env()].
+#' @param arguments The arguments of the environment, a list.
+#' @return As [as_vector_env()], without the functions that play, and with `description`, a list:
+#'   `fields`, JSON texts by which a request names the environment, `group`, the number of episodes
+#'   that share a seed if all sub-environments have one generator (or `NULL`), `processes`, the
+#'   number that play, `needs_max_steps`, whether an episode may go on forever, `versions` and
+#'   `processor`. `NULL` if R plays its episodes: an environment in R or an object, frames, wrappers
+#'   that remember earlier episodes, arguments about sub-environments, an older server.
+#' @noRd
+describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
+                         call = rlang::caller_env()) {
+  played_here <- frames || !is_made_by_server(env_id) || any(names(arguments) %in% how_made()) ||
+    calls_r(env_id) || length(remembering(wrapper_names(noted_wrappers(env_id))))
+  if (played_here) {
+    return(NULL)
+  }
+  check_dots_named(arguments, "seed = 1", call)
+  check_client(client, call = call)
+  described <- known_description(client, env_id, arguments, call)
+  other_size <- isTRUE(described$one_seed) && !is.null(num_envs) && num_envs != described$num_envs
+  if (is.null(described) || other_size) {
+    return(NULL)
+  }
+  described$num_envs <- as.integer(num_envs %||% described$num_envs)
+  described$batch_size <- episodes_of_batch(described$num_envs)
+  described
+}
+
+# The server's description of an environment, `NULL` if it does not play it itself.
+known_description <- function(client, env_id, arguments, call) {
+  if (!plays_rollouts(client, call)) {
+    return(NULL)
+  }
+  # What is known about an environment of one version of the server, as long as the client lives.
+  state <- client_state(client)
+  state$known_envs <- state$known_envs %||% new.env(parent = emptyenv())
+  key <- rlang::hash(list(env_id, if (length(arguments)) arguments, server_versions(client)))
+  known <- state$known_envs[[key]] %||% new.env(parent = emptyenv())
+  state$known_envs[[key]] <- known
+  known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
+  described <- known$described[[1L]]
+  if (!is.null(described)) described$known <- known
+  described
+}
+
+# The names of arguments that do not belong to the environment.
+how_made <- function() {
+  setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
+}
+
+# Whether it is given by an id that a server knows.
+is_made_by_server <- function(env) is_given_by_id(env) && !is_registered(env)
+
+ask_description <- function(client, env_id, arguments, call) {
+  wrappers <- noted_wrappers(env_id)
+  fields <- c(
+    env_id = json_string(bare_id(env_id)), kwargs = if (length(arguments)) to_json(arguments),
+    wrappers = if (length(wrappers)) wrappers_json(wrappers)
+  )
+  answer <- tryCatch(
+    withCallingHandlers(
+      perform_request(
+        prepare_request(client, rollouts_route, fields = fields, repeatable = TRUE), call = call
+      ),
+      gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(arguments), call)
+    ),
+    gym_error_http = function(cnd) {
+      if (!isTRUE(cnd$code %in% c("not_supported", "too_many_processes"))) rlang::cnd_signal(cnd)
+    }
+  )
+  warn_as_gymnasium(answer)
+  if (is.null(answer) || length(answer$remembers)) {
+    return(NULL)
+  }
+  is_natural <- function(x) is_number(x) && are_whole(x, 1, 2^24)
+  check_optional(answer, "env_id", rlang::is_string, "a string")
+  check_optional(answer, "spec", is_object, "an object")
+  check_optional(answer, "group", is_natural, "a whole number")
+  check_optional(answer, "processes", is_natural, "a whole number")
+  check_optional(answer, "needs_max_steps", rlang::is_bool, "true or false")
+  check_optional(answer$spec, "max_episode_steps", is_number, "a number")
+  observed <- read_space(answer, "observation_space")
+  observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
+  num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
+  spec <- read_spec(answer$env_id, answer$spec)
+  new_vector_env(
+    observed, read_space(answer, "action_space"),
+    c(spec, list(wrappers = wrapper_names(wrappers), kwargs = arguments)),
+    num_envs, episodes_of_batch(num_envs), one_seed = !is.null(answer$group), client = client,
+    description = list(
+      fields = fields, group = answer$group, processes = answer$processes %||% 1L,
+      needs_max_steps = answer$needs_max_steps %||% is.null(answer$spec$max_episode_steps),
+      versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
+    )
+  )
+}
+
+rollouts_route <- "/v1/rollouts/"

@@ -52,8 +52,7 @@ bandit <- function(arms = 10, mean = NULL, sd = 1, centre = 0, drift = 0,
     },
     observation_space = space_discrete(1), action_space = space_discrete(arms), vectorized = TRUE,
     bandit = structure(
-      list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift),
-      class = "gym_bandit"
+      list(arms = arms, mean = mean, sd = sd, centre = centre, drift = drift), class = "gym_bandit"
     ),
     id = paste0("Bandit-", arms), max_episode_steps = horizon
   )
@@ -72,9 +71,7 @@ draw_means <- function(bandit, n) {
 pull <- function(bandit, means, arm) {
   n <- nrow(means)
   reward <- means[cbind(seq_len(n), arm)] + bandit$sd * stats::rnorm(n)
-  if (bandit$drift > 0) {
-    means <- means + bandit$drift * stats::rnorm(length(means))
-  }
+  if (bandit$drift > 0) means <- means + bandit$drift * stats::rnorm(length(means))
   list(reward = reward, means = means)
 }
 

@@ -16,14 +16,24 @@ look_at_environment <- function(check, seed) {
   }
   second <- play_and_look(check, seed + 1)
   look_at_end(check, list(first, second))
-  look_at_draws(check, first$states, second$states)
+  # Two episodes with different seeds only have the same state of the generator if somebody sets it.
+  for (topic in names(first$states)) {
+    if (identical(first$states[[topic]], second$states[[topic]])) {
+      note_finding(check, "seeds", paste0(
+        "`", topic, "()` sets the state of the random generator, as `set.seed()` does, so that ",
+        "every episode draws the same numbers for any seed: remove that call."
+      ))
+      break
+    }
+  }
   remembers <- remembering(check$env$spec$wrappers)
   if (length(remembers)) {
     note_finding(check, "seeds", paste0(
       remembers[[1L]], " remembers earlier episodes: later the same seed gives other numbers."
     ), severity = "note")
   } else {
-    look_at_repetition(check, first, seed)
+    again <- play_and_look(check, seed, first$actions)
+    if (!is.null(again)) look_at_difference(check, first, again, seed)
     look_at_reset_without_seed(check, seed)
   }
   look_at_render(check, seed)
@@ -38,20 +48,6 @@ look_at_model <- function(env, check, seed) UseMethod("look_at_model")
 
 #' @exportS3Method
 look_at_model.default <- function(env, check, seed) NULL
-
-# The generators of two episodes with different seeds only have the same state if somebody sets it.
-look_at_draws <- function(check, states, others) {
-  set <- Filter(
-    function(topic) !is.null(states[[topic]]) && identical(states[[topic]], others[[topic]]),
-    c("reset", "step")
-  )
-  if (length(set)) {
-    note_finding(check, "seeds", paste0(
-      "`", set[[1L]], "()` sets the state of the random generator, as `set.seed()` does, so that ",
-      "every episode draws the same numbers for any seed: remove that call."
-    ))
-  }
-}
 
 # The same kind of finding is recorded once, at its first occurrence.
 note_finding <- function(check, topic, finding, key = finding, severity = "wrong") {
@@ -101,26 +97,21 @@ look_at_space <- function(check, kind) {
 look_at_part <- function(check, space, path) {
   note <- function(...) note_finding(check, "spaces", paste0(...), severity = "note")
   if (has_parts(space)) {
-    if (!length(space$spaces)) {
-      note("`", path, "` is a ", space$name, " without parts.")
-    }
+    if (!length(space$spaces)) note("`", path, "` is a ", space$name, " without parts.")
     keys <- names(space$spaces)
     for (i in seq_along(space$spaces)) {
       part <- if (is.null(keys)) path_index(path, i - 1L) else path_key(path, keys[[i]])
       look_at_part(check, space$spaces[[i]], part)
     }
   } else if (inherits(space, "gym_space_box")) {
-    look_at_box(space, path, note)
-  }
-}
-
-look_at_box <- function(space, path, note) {
-  fixed <- which(space$low == space$high)
-  if (length(fixed)) {
-    note("Number ", fixed[[1L]], " of `", path, "` can only be ", space$low[fixed[[1L]]], ".")
-  }
-  if (startsWith(path, "$action") && any(is.infinite(c(space$low, space$high)))) {
-    note("The actions of `", path, "` have no bounds: a policy that chooses among them needs some.")
+    fixed <- which(space$low == space$high)
+    if (length(fixed)) {
+      note("Number ", fixed[[1L]], " of `", path, "` can only be ", space$low[fixed[[1L]]], ".")
+    }
+    if (startsWith(path, "$action") && any(is.infinite(c(space$low, space$high)))) {
+      note("The actions of `", path, "` have no bounds: a policy that chooses among them needs ",
+           "some.")
+    }
   }
 }
 
@@ -144,11 +135,6 @@ look_at_end <- function(check, episodes) {
 }
 
 # Seeds ---------------------------------------------------------------------------------
-
-look_at_repetition <- function(check, first, seed) {
-  again <- play_and_look(check, seed, first$actions)
-  if (!is.null(again)) look_at_difference(check, first, again, seed)
-}
 
 look_at_reset_without_seed <- function(check, seed) {
   following <- lapply(1:2, function(time) {
@@ -178,16 +164,16 @@ look_at_difference <- function(check, first, again, seed) {
   }
   for (i in seq_len(min(length(first$results), length(again$results)))) {
     for (name in c("observation", "reward", flags, "info")) {
-      one <- element_of(first$results[[i]], name)
-      other <- element_of(again$results[[i]], name)
-      if (!identical(one, other)) {
-        return(note(paste0("values of `", name, "` in step ", i), one, other))
+      each <- lapply(list(first, again), function(episode) {
+        out <- episode$results[[i]]
+        if (is.list(out)) out[[name]] else out
+      })
+      if (!identical(each[[1L]], each[[2L]])) {
+        return(note(paste0("values of `", name, "` in step ", i), each[[1L]], each[[2L]]))
       }
     }
   }
 }
-
-element_of <- function(out, name) if (is.list(out)) out[[name]] else out
 
 # For numbers it shows the first difference.
 difference_text <- function(one, other) {
@@ -206,18 +192,14 @@ difference_text <- function(one, other) {
 
 look_at_render <- function(check, seed) {
   env <- check$env
-  if (!is.null(env[["num_envs"]]) || !can_be_drawn(env)) {
-    return()
-  }
-  env$reset(seed = seed)
-  # Discard plots.
-  on_device(grDevices::pdf(NULL), call_and_look(check, "render", "`render()`", env$render()))
-}
-
-can_be_drawn <- function(env) {
-  if (is_server_env(env)) {
+  draws <- if (is_server_env(env)) {
     known_instance(env$client, env$instance_id)$draws
   } else {
     is.function(env[["render"]])
+  }
+  if (draws && is.null(env[["num_envs"]])) {
+    env$reset(seed = seed)
+    # Discard plots.
+    on_device(grDevices::pdf(NULL), call_and_look(check, "render", "`render()`", env$render()))
   }
 }

@@ -6,7 +6,12 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_wrappers(wrappers, call = call)
   wrappers <- c(noted_wrappers(env_id), wrappers)
   env_id <- bare_id(env_id)
-  check_no_transforms(wrappers, call)
+  calling_r <- intersect(wrapper_names(wrappers), names(transforms))
+  if (length(calling_r)) {
+    abort_misuse("wrappers", calling_r, call,
+                 "{calling_r[[1L]]} calls an R function, which an instance on a server cannot do.",
+                 i = "Use `gym_make()` instead of the classic calls.")
+  }
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
@@ -14,21 +19,17 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
   check_num_workers(num_workers, num_envs, call = call)
   check_string(name, allow_null = TRUE, call = call)
-  fields <- c(
-    env_id = json_string(env_id),
-    num_envs = if (!is.null(num_envs)) whole_text(num_envs),
-    num_workers = if (!is.null(num_workers)) whole_text(num_workers),
-    vectorization_mode = if (!is.null(vectorization_mode)) json_string(vectorization_mode),
-    autoreset_mode = if (!is.null(autoreset_mode)) json_string(autoreset_mode),
-    seed = encode_seed(seed, num_envs, call),
-    render_mode = if (!is.null(render_mode)) json_string(render_mode),
-    kwargs = if (length(kwargs)) to_json(kwargs),
-    wrappers = if (length(wrappers)) wrappers_json(wrappers),
-    name = if (!is.null(name)) json_string(name)
+  numbers <- list(num_envs = num_envs, num_workers = num_workers)
+  texts <- list(
+    env_id = env_id, vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode,
+    render_mode = render_mode, name = name
   )
-  if (identical(render_mode, "human")) {
-    check_viewer(call)
-  }
+  fields <- c(
+    vapply(numbers[lengths(numbers) > 0L], whole_text, ""), json_texts(texts[lengths(texts) > 0L]),
+    seed = encode_seed(seed, num_envs, call), kwargs = if (length(kwargs)) to_json(kwargs),
+    wrappers = if (length(wrappers)) wrappers_json(wrappers)
+  )
+  if (identical(render_mode, "human")) check_viewer(call)
   close_queued(client)
   answer <- create_on_server(client, fields, call)
   instance_id <- answer$instance_id
@@ -36,19 +37,15 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   on.exit(if (!ready) close_unused(client, instance_id))
   if (is.null(answer$action_space)) {
     gym_abort(
-      c(
-        paste0("The server at ", client$remote_base, " is an old one, such as that of ",
+      c(paste0("The server at ", client$remote_base, " is an old one, such as that of ",
                "gym-http-api: it does not describe its environments."),
-        i = "`gym_server_start()` starts this package's server, which the same calls play on."
-      ),
+        i = "`gym_server_start()` starts this package's server, which the same calls play on."),
       class = "gym_error_http", code = "not_supported", call = call
     )
   }
   instances <- client_state(client)$instances
   instances[[instance_id]] <- new_instance(client, instance_id, answer)
-  if (identical(render_mode, "human")) {
-    watch_once(known_instance(client, instance_id, call), call)
-  }
+  if (identical(render_mode, "human")) watch_once(known_instance(client, instance_id, call), call)
   warn_as_gymnasium(answer)
   ready <- TRUE
   instance_id
@@ -59,9 +56,7 @@ close_instance <- function(client, instance_id, call = rlang::caller_env()) {
   perform_request(prepare_request(client, route, once = TRUE), call = call)
   forget_instance(instance_place(client, instance_id))
   instances <- client_state(client)$instances
-  if (!is.null(instances[[instance_id]])) {
-    rm(list = instance_id, envir = instances)
-  }
+  if (!is.null(instances[[instance_id]])) rm(list = instance_id, envir = instances)
 }
 
 # Closes an instance that may not exist any more.
@@ -76,10 +71,7 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
 }
 
 # The codes of errors for an instance that was closed or removed.
-gone_codes <- c(
-  "unknown_instance", "instance_idle_closed", "call_too_long",
-  "environment_died"
-)
+gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "environment_died")
 
 # The client's knowledge of an instance. The server is asked once.
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {
@@ -158,7 +150,8 @@ new_instance <- function(client, instance_id, about) {
   instance$autoreset_mode <- shown_line(about$autoreset_mode)
   instance$single_action_space <- read_space(about, "action_space")
   observed <- read_space(about, "observation_space")
-  observed$names <- observation_names(about$env_id, observed, wrappers_of(about))
+  wrappers <- lapply(about$wrappers, function(wrapper) wrapper["name"])
+  observed$names <- observation_names(about$env_id, observed, as.character(unlist(wrappers)))
   instance$single_observation_space <- observed
   instance$name_observation <- naming(observed, batch = !is.null(about$num_envs))
   instance$actions <- sent_space(instance$single_action_space, about$num_envs)
@@ -177,12 +170,11 @@ new_instance <- function(client, instance_id, about) {
 
 # Reads the server's description of an environment's spec.
 read_spec <- function(env_id, spec) {
+  threshold <- spec$reward_threshold
   c(
     list(
       id = shown_line(env_id),
-      reward_threshold = if (!is.null(spec$reward_threshold)) {
-        number_from(spec$reward_threshold, "reward_threshold")
-      },
+      reward_threshold = if (!is.null(threshold)) number_from(threshold, "reward_threshold"),
       max_episode_steps = spec$max_episode_steps,
       # The environment's own metadata may be anything.
       render_fps = if (is_number(spec$render_fps)) spec$render_fps
@@ -196,16 +188,9 @@ texts_of <- function(json) lapply(Filter(rlang::is_string, as.list(json)), shown
 # Gymnasium's warnings about an environment that the server made.
 warn_as_gymnasium <- function(answer) {
   for (text in texts_of(answer$warnings)) {
-    rlang::warn(
-      text, class = "gym_warning_gymnasium", .frequency = "once",
-      .frequency_id = paste("gym", text)
-    )
+    rlang::warn(text, class = "gym_warning_gymnasium", .frequency = "once",
+                .frequency_id = paste("gym", text))
   }
-}
-
-# The names of the wrappers around an instance.
-wrappers_of <- function(about) {
-  as.character(unlist(lapply(about$wrappers, function(wrapper) wrapper["name"])))
 }
 
 # The space of all sub-environments together is made only on request: the bounds of thousands of
@@ -215,9 +200,7 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
     return(instance[[paste0("single_", which)]])
   }
   instance[[which]] %||% (
-    instance[[which]] <- spread_bounds(
-      switch(which, action_space = instance$actions, observation_space = instance$observations)
-    )
+    instance[[which]] <- spread_bounds(instance[[sub("_space", "s", which)]])
   )
 }
 
@@ -228,7 +211,14 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
     return(NULL)
   }
   if (inherits(seed, "gym_seed_lists")) {
-    return(encode_seed_lists(seed, num_envs, call))
+    # A vector of seeds for each sub-environment, `NA` for those that are not reset.
+    is_none <- function(one) identical(one, NA_real_)
+    fits <- function(one) is_none(one) || length(one) && are_whole(one, 0, largest_seed)
+    if (is.null(num_envs) || length(seed) != num_envs || !all(vapply(seed, fits, NA))) {
+      abort_argument(seed, "a list with a vector of seeds for each sub-environment", "seed", call)
+    }
+    texts <- function(one) if (is_none(one)) "null" else json_array(whole_text(one))
+    return(json_array(vapply(seed, texts, "")))
   }
   seed <- plain_numbers(seed, call = call)
   if (is.null(num_envs) || length(seed) == 1L) {
@@ -239,14 +229,60 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   json_array(ifelse(is.na(seed), "null", whole_text(seed)))
 }
 
-# A vector of seeds for each sub-environment, `NA` for those that are not reset.
-encode_seed_lists <- function(seeds, num_envs, call) {
-  is_none <- function(one) identical(one, NA_real_)
-  fits <- function(one) is_none(one) || length(one) && are_whole(one, 0, largest_seed)
-  if (is.null(num_envs) || length(seeds) != num_envs || !all(vapply(seeds, fits, NA))) {
-    abort_argument(seeds, "a list with a vector of seeds for each sub-environment", "seed", call)
+# FrozenLake's random maps -----------------------------------------------------------------
+
+# Gymnasium draws one in the constructor, from a generator that cannot be
+# seeded. Here it is drawn from the seed of the run and sent.
+
+lake_size <- 8L
+chance_of_ice <- 0.8
+
+#' Draw the map of a FrozenLake with a random map
+#'
+#' @param env An environment, or its id.
+#' @param arguments The arguments that it is made with.
+#' @param seed The seed of the map; of several, the first that is given. `NULL` leaves the map to
+#'   the server.
+#' @return The arguments, with the map as `desc`.
+#' @noRd
+with_random_map <- function(env, arguments, seed) {
+  seed <- stats::na.omit(unlist(seed))
+  if (length(seed) && is.numeric(seed) && wants_random_map(env, arguments)) {
+    arguments$desc <- with_generator(new_generator(seed[[1L]]), draw_lake())
   }
-  json_array(vapply(seeds, function(one) {
-    if (is_none(one)) "null" else json_array(whole_text(one))
-  }, ""))
+  arguments
+}
+
+# By default FrozenLake has a map with a name.
+wants_random_map <- function(env, arguments) {
+  id <- bare_id(env)
+  rlang::is_string(id) && grepl("^FrozenLake", id) && "map_name" %in% names(arguments) &&
+    is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
+}
+
+# Like Gymnasium: draws cells until there is a way from the start to the goal.
+draw_lake <- function() {
+  repeat {
+    cells <- matrix(stats::runif(lake_size^2) < chance_of_ice, lake_size)
+    cells[c(1L, lake_size^2)] <- TRUE
+    if (has_way(cells)) break
+  }
+  cells[] <- ifelse(cells, "F", "H")
+  cells[c(1L, lake_size^2)] <- c("S", "G")
+  apply(cells, 1L, paste, collapse = "")
+}
+
+# Is there a way over ice from the first cell to the last?
+has_way <- function(ice) {
+  n <- nrow(ice)
+  reached <- row(ice) == 1L & col(ice) == 1L
+  repeat {
+    beside <- rbind(reached[-1L, ], FALSE) | rbind(FALSE, reached[-n, ]) |
+      cbind(reached[, -1L], FALSE) | cbind(FALSE, reached[, -n])
+    grown <- ice & (reached | beside)
+    if (identical(grown, reached)) {
+      return(reached[n, n])
+    }
+    reached <- grown
+  }
 }

@@ -109,8 +109,7 @@ gym_make <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs = NU
     env_id = env_id, ..., seed = seed %||% draw_seed(), render_mode = render_mode,
     num_envs = num_envs, wrappers = wrappers, client = client,
     vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
-    num_workers = num_workers,
-    call = rlang::current_env()
+    num_workers = num_workers, call = rlang::current_env()
   )
 }
 
@@ -145,9 +144,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
     gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(kwargs), call)
   )))
   env <- server_env$new(client, instance_id, wrappers$server, kwargs)
-  for (wrapper in wrappers$r) {
-    env <- wrap_server_env(env, wrapper[[1L]], wrapper[-1L], call)
-  }
+  for (wrapper in wrappers$r) env <- wrap_server_env(env, wrapper[[1L]], wrapper[-1L], call)
   env
 }
 
@@ -163,14 +160,12 @@ explain_unknown_argument <- function(cnd, given, call) {
   own <- arguments_of(if (length(others)) others else passed[1L])
   # The last one is an argument of all environments.
   choices <- c(arguments_of(passed), "max_episode_steps")
+  by <- paste0("`", names(passed)[[1L]], "()`")
   gym_abort(
-    c(
-      paste0("Neither `", names(passed)[[1L]], "()` nor the environment has an argument `", name,
-             "`."),
+    c(paste0("Neither ", by, " nor the environment has an argument `", name, "`."),
       i = did_you_mean(name, choices) %||%
-        paste0("`", names(passed)[[1L]], "()` has ", quoted_names(own),
-               "; see the environment's documentation for those of its own.")
-    ),
+        paste0(by, " has ", quoted_names(own),
+               "; see the environment's documentation for those of its own.")),
     class = class(cnd)[seq_len(match("gym_error", class(cnd)) - 1L)],
     status = cnd$status, code = cnd$code, argument = name, call = call
   )
@@ -196,24 +191,15 @@ passed_on_by <- function(name) {
 }
 
 arguments_of <- function(functions) {
-  setdiff(
-    unlist(lapply(functions, function(f) names(formals(f)))),
-    c("env_id", "env", "agent", "x", "...")
-  )
+  names <- unlist(lapply(functions, function(f) names(formals(f))))
+  setdiff(names, c("env_id", "env", "agent", "x", "..."))
 }
 
 server_env <- R6Class(
-  c("gym_server_env", "gym_env"),
-  cloneable = FALSE,
-  lock_class = TRUE,
+  c("gym_server_env", "gym_env"), cloneable = FALSE, lock_class = TRUE,
   public = list(
-    instance_id = NULL,
-    single_action_space = NULL,
-    single_observation_space = NULL,
-    num_envs = NULL,
-    vectorization_mode = NULL,
-    num_workers = NULL,
-    autoreset_mode = NULL,
+    instance_id = NULL, single_action_space = NULL, single_observation_space = NULL,
+    num_envs = NULL, vectorization_mode = NULL, num_workers = NULL, autoreset_mode = NULL,
     spec = NULL,
     initialize = function(client, instance_id, wrappers = list(), kwargs = list()) {
       private$instance <- known_instance(client, instance_id)
@@ -274,9 +260,7 @@ server_env <- R6Class(
     }
   ),
   private = list(
-    instance = NULL,
-    pid = NULL,
-    closed = FALSE,
+    instance = NULL, pid = NULL, closed = FALSE,
     # What has ended before it was closed, in words.
     ended = NULL,
     finalize = function() {
@@ -304,7 +288,7 @@ print_env <- function(env, how, observations, actions) {
   invisible(env)
 }
 
-# Why an environment that is not open is not.
+# Says why an environment is not open.
 end_text <- function(env) {
   ended <- env$.__enclos_env__$private$ended
   if (is.null(ended)) "closed" else paste("made", ended)
@@ -320,22 +304,13 @@ summary.gym_env <- function(object, ...) object
 #' @export
 `$.gym_env` <- function(x, name) {
   member <- .subset2(x, name)
-  if (is.null(member)) member_or_abort(x, name) else member
-}
-
-member_or_abort <- function(x, name, call = rlang::caller_env()) {
-  if (exists(name, envir = x, inherits = FALSE)) {
-    return(NULL)
+  if (is.null(member) && !exists(name, envir = x, inherits = FALSE)) {
+    members <- setdiff(ls(x), c("initialize", "print"))
+    abort_misuse(name, NULL, rlang::current_env(), "An environment has no `${name}`.",
+                 i = did_you_mean(name, members, "`$%s`"),
+                 i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), "."))
   }
-  members <- setdiff(ls(x), c("initialize", "print"))
-  gym_abort(
-    c(
-      paste0("An environment has no `$", name, "`."),
-      i = did_you_mean(name, members, "`$%s`"),
-      i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), ".")
-    ),
-    class = "gym_error_argument", argument = name, call = call
-  )
+  member
 }
 
 # R6's own method reads `x$format`, which an environment does not have.
@@ -355,13 +330,10 @@ check_open <- function(env, call = rlang::caller_env()) {
 abort_closed <- function(hint, call, end = "closed", client = NULL) {
   closed <- end == "closed"
   gym_abort(
-    c(
-      paste0("This environment was ", end, "."),
-      if (!closed) end_bullets(client$remote_base),
-      i = hint
-    ),
-    # To use one that was closed is a mistake; one that ended with its server is an answer that did
-    # not come.
+    c(paste0("This environment was ", end, "."),
+      if (!closed) end_bullets(client$remote_base), i = hint),
+    # Using a closed environment is a mistake of the user's. If it ended with its server, the
+    # connection was lost.
     class = if (closed) "gym_error_argument" else "gym_error_connection",
     argument = if (closed) "env", call = call
   )

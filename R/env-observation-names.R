@@ -111,9 +111,7 @@ episode_limits <- list(
       at = c(-1, 1) * 12 * pi / 180, kind = "failure", text = "fails at \u00b112\u00b0"
     )
   ),
-  LunarLander = list(
-    x = list(at = c(-1, 1), kind = "failure", text = "fails at \u00b11")
-  ),
+  LunarLander = list(x = list(at = c(-1, 1), kind = "failure", text = "fails at \u00b11")),
   MountainCar = list(position = list(at = 0.5, kind = "goal", text = "goal: 0.5")),
   MountainCarContinuous = list(position = list(at = 0.45, kind = "goal", text = "goal: 0.45"))
 )

@@ -1,32 +1,5 @@
-# A sub-environment written in R: its functions and its state. A single environment has one of
-# these; a vectorised one has all its sub-environments in one.
-
-#' Make a sub-environment
-#'
-#' @param reset A function of `seed` and `options` that returns the first observation.
-#' @param step A function of an action, like the user's `step()`.
-#' @param render A function without arguments that draws it, or `NULL`.
-#' @param takes_options Whether the user's `reset()` accepts options.
-#' @param num_envs `NULL`, or the number of sub-environments of a vectorised one.
-#' @return An environment: these, and `generator`, its random generator, `NULL` before first use;
-#'   `taken`, the number of steps in the episode, `NA` before the first reset; `ended`, whether it
-#'   has ended, `NA` after the warning; `closed`.
-#' @noRd
-new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALSE,
-                        num_envs = NULL) {
-  sub_env <- new.env(parent = emptyenv())
-  sub_env$traits <- traits
-  sub_env$reset <- reset
-  sub_env$step <- step
-  sub_env$render <- render
-  sub_env$takes_options <- takes_options
-  sub_env$num_envs <- num_envs
-  sub_env$generator <- NULL
-  sub_env$taken <- NA_integer_
-  sub_env$ended <- FALSE
-  sub_env$closed <- FALSE
-  sub_env
-}
+# Steps and resets of a sub-environment written in R, see definition_sub_env(), and the constant
+# part of it.
 
 #' Start an episode
 #'
@@ -37,16 +10,12 @@ new_sub_env <- function(traits, reset, step, render = NULL, takes_options = FALS
 reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number = NULL,
                           call = rlang::caller_env()) {
   if (!is.null(options) && !sub_env$takes_options) {
-    gym_abort(
-      c(paste0("`reset()` of ", sub_env$traits$spec$id, " does not accept options."),
-        i = "Give it an argument `options` to accept them."),
-      class = "gym_error_argument", argument = "options", value = options, call = call
-    )
+    abort_misuse("options", options, call,
+                 "`reset()` of {sub_env$traits$spec$id} does not accept options.",
+                 i = "Give it an argument `options` to accept them.")
   }
-  if (!is.null(seed)) {
-    sub_env$generator <- new_generator(seed)
-  } else if (is.null(sub_env$generator)) {
-    sub_env$generator <- new_generator(draw_seed())
+  if (!is.null(seed) || is.null(sub_env$generator)) {
+    sub_env$generator <- new_generator(seed %||% draw_seed())
   }
   sub_env$taken <- NA_integer_
   observation <- withCallingHandlers(
@@ -76,11 +45,8 @@ raw_step <- function(sub_env, action, call) {
 
 check_was_reset <- function(sub_env, call) {
   if (is.na(sub_env$taken)) {
-    gym_abort(
-      c(paste0(sub_env$traits$spec$id, " has not been reset."),
-        i = "`env$reset()` starts an episode."),
-      class = "gym_error_argument", argument = "env", call = call
-    )
+    abort_misuse("env", NULL, call, "{sub_env$traits$spec$id} has not been reset.",
+                 i = "`env$reset()` starts an episode.")
   }
 }
 
@@ -127,17 +93,14 @@ new_traits <- function(observation_space, action_space, id, max_episode_steps = 
   observation_rules <- allow_rounding(observation_space)
   action_rules <- loosen_boxes(action_space)
   list(
-    observation_space = observation_space,
-    action_space = action_space,
+    observation_space = observation_space, action_space = action_space,
     spec = list(
       id = id, reward_threshold = reward_threshold,
       max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps),
       render_fps = render_fps
     ),
-    limit = max_episode_steps %||% Inf,
-    observation_rules = observation_rules,
-    action_rules = action_rules,
-    fits_observations = quick_check(observation_rules),
+    limit = max_episode_steps %||% Inf, observation_rules = observation_rules,
+    action_rules = action_rules, fits_observations = quick_check(observation_rules),
     fits_actions = quick_check(action_rules)
   )
 }
@@ -182,11 +145,8 @@ checked_action <- function(traits, action, which, call) {
   if (!fits_quickly(rules, action, n, traits$fits_actions)) {
     check_one_or_batch(rules, action, n, call, which)
   }
-  if (is.null(n)) {
-    tidy_value(traits$action_space, action, NULL)
-  } else {
-    tidy_actions(traits$action_space, action)
-  }
+  space <- traits$action_space
+  if (is.null(n)) tidy_value(space, action, NULL) else tidy_actions(space, action)
 }
 
 #' Convert a value to the form of a server's values
@@ -230,11 +190,8 @@ action_picker <- function(space) {
 # TRUE counts as 1 for Discrete actions.
 tidy_actions <- function(space, action) {
   if (inherits(space, "gym_space_discrete")) {
-    narrow_whole(action)
-  } else {
-    if (is.array(action) && !is.null(dimnames(action))) {
-      dimnames(action) <- NULL
-    }
-    action
+    return(narrow_whole(action))
   }
+  if (is.array(action) && !is.null(dimnames(action))) dimnames(action) <- NULL
+  action
 }

@@ -11,26 +11,20 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_count(num_envs, allow_null = TRUE)
   check_one_framed(num_envs, frames)
   check_sub_env_open(sub_env_of(x))
-  r_vector_env(x, num_envs, max_envs, frames)
-}
-
-# Plays an environment in R in copies of it.
-r_vector_env <- function(env, num_envs, max_envs, frames, call = rlang::caller_env()) {
-  definition <- definition_of(env)
+  definition <- definition_of(x)
   if (frames) {
-    check_renders(sub_env_of(env), call)
+    check_renders(sub_env_of(x))
     num_envs <- 1L
   }
   if (definition$vectorized) {
     return(vectorized_vector_env(definition, as.integer(num_envs %||% vectorized_sub_envs), frames))
   }
   n <- num_envs %||% min(r_sub_envs, max_envs)
-  if (n == 1L) {
-    alone <- r_env$new(definition)
-    sub_envs <- list(sub_env_of(alone))
+  alone <- if (n == 1L) r_env$new(definition)
+  sub_envs <- if (is.null(alone)) {
+    lapply(seq_len(n), function(i) definition_sub_env(definition))
   } else {
-    alone <- NULL
-    sub_envs <- lapply(seq_len(n), function(i) definition_sub_env(definition))
+    list(sub_env_of(alone))
   }
   scalar_vector_env(sub_envs, episodes_of_batch(num_envs %||% r_sub_envs), frames, alone)
 }
@@ -70,9 +64,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
       action <- checked_action(traits, action, which, call)
       stepping <- sub_envs[which]
       taken <- vapply(stepping, function(sub_env) sub_env$taken, 0L) + 1L
-      if (anyNA(taken)) {
-        check_was_reset(stepping[[which.max(is.na(taken))]], call)
-      }
+      if (anyNA(taken)) check_was_reset(stepping[[which.max(is.na(taken))]], call)
       outs <- vector("list", length(which))
       k <- 0L
       session <- globalenv()
@@ -89,13 +81,9 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
         error = function(cnd) abort_raised(cnd, stepping[[k]], number(which[[k]]), call)
       ))
       result <- stack(outs) %||% stack_checked(outs, stepping, lapply(which, number), call)
-      if (traits$limit < Inf) {
-        result$truncated <- result$truncated | taken >= traits$limit
-      }
+      if (traits$limit < Inf) result$truncated <- result$truncated | taken >= traits$limit
       ended <- result$terminated | result$truncated
-      if (any(ended)) {
-        for (sub_env in stepping[ended]) sub_env$ended <- TRUE
-      }
+      for (sub_env in stepping[ended]) sub_env$ended <- TRUE
       result$next_observation <- result$observation
       result
     }
@@ -136,9 +124,7 @@ single_stepper <- function(sub_env) {
     assign(".Random.seed", own, envir = session)
     taken <- sub_env$taken + 1L
     sub_env$taken <- taken
-    if (!is_right_step(out, traits)) {
-      out <- complete_step(out, sub_env, call = NULL)
-    }
+    if (!is_right_step(out, traits)) out <- complete_step(out, sub_env, call = NULL)
     list(
       reward = out$reward, terminated = out$terminated,
       truncated = isTRUE(out$truncated) || taken >= limit,
@@ -147,7 +133,7 @@ single_stepper <- function(sub_env) {
   }
 }
 
-# Whether a step is certainly correct.
+# A quick check of the usual case: `TRUE` if the step certainly has the right parts.
 is_right_step <- function(out, traits) {
   reward <- if (is.list(out)) out$reward
   flag <- out$terminated
@@ -157,7 +143,7 @@ is_right_step <- function(out, traits) {
     fits_quickly(traits$observation_space, out$observation, NULL, traits$fits_observations)
 }
 
-# Adds the place to an error of a step.
+# Adds to an error in a step which environment and which step it was.
 single_guard <- function(sub_env) {
   sub_env$stepping <- FALSE
   function(code) {
@@ -176,9 +162,30 @@ single_guard <- function(sub_env) {
 #' @noRd
 result_stacker <- function(traits) {
   space <- traits$observation_space
-  stack <- observation_stacker(space)
-  if (is.null(stack)) {
+  # Values of other spaces must be checked one by one.
+  if (!is_stackable(space)) {
     return(function(outs) NULL)
+  }
+  shape <- as.integer(space$shape)
+  size <- prod(shape)
+  # A batch of observations, `NULL` if they have not all the shape of the space.
+  stack <- function(values, n) {
+    shaped <- if (length(shape) > 1L) {
+      all(vapply(values, function(value) identical(dim(value), shape), NA))
+    } else {
+      is.null(unlist(lapply(values, dim))) && all(lengths(values) == size)
+    }
+    if (!shaped || any(vapply(values, is.object, NA))) {
+      return(NULL)
+    }
+    numbers <- unlist(values, recursive = FALSE, use.names = FALSE)
+    if (length(shape) == 0L || !is.atomic(numbers)) {
+      return(numbers)
+    }
+    dim(numbers) <- c(size, n)
+    numbers <- t(numbers)
+    if (length(shape) > 1L) dim(numbers) <- c(n, shape)
+    numbers
   }
   function(outs) {
     n <- length(outs)
@@ -186,8 +193,7 @@ result_stacker <- function(traits) {
       return(NULL)
     }
     result <- list(
-      reward = stack_singles(outs, "reward"),
-      terminated = stack_singles(outs, "terminated"),
+      reward = stack_singles(outs, "reward"), terminated = stack_singles(outs, "terminated"),
       truncated = stack_singles(outs, "truncated", optional = TRUE)
     )
     observation <- if (is.null(wrong_parts(result, n))) {
@@ -208,35 +214,6 @@ stack_singles <- function(outs, name, optional = FALSE) {
     unlist(each, recursive = FALSE, use.names = FALSE)
   } else if (optional && all(length_of == 0L)) {
     logical(length(outs))
-  }
-}
-
-# NULL for spaces whose values must be checked one by one.
-observation_stacker <- function(space) {
-  if (!is_stackable(space)) {
-    return(NULL)
-  }
-  shape <- as.integer(space$shape)
-  size <- prod(shape)
-  has_shape <- if (length(shape) > 1L) {
-    function(values) all(vapply(values, function(value) identical(dim(value), shape), NA))
-  } else {
-    function(values) is.null(unlist(lapply(values, dim))) && all(lengths(values) == size)
-  }
-  function(values, n) {
-    if (any(vapply(values, is.object, NA)) || !has_shape(values)) {
-      return(NULL)
-    }
-    numbers <- unlist(values, recursive = FALSE, use.names = FALSE)
-    if (length(shape) == 0L || !is.atomic(numbers)) {
-      return(numbers)
-    }
-    dim(numbers) <- c(size, n)
-    numbers <- t(numbers)
-    if (length(shape) > 1L) {
-      dim(numbers) <- c(n, shape)
-    }
-    numbers
   }
 }
 

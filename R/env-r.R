@@ -108,12 +108,9 @@ gym_env <- function(reset, step, observation_space, action_space, ..., render = 
   match_whole_names()
   check_takes(reset, "self")
   check_takes(step, c("self", "action"))
-  if (!is.null(render)) {
-    check_takes(render, "self")
-  }
+  if (!is.null(render)) check_takes(render, "self")
   check_flag(vectorized)
-  if (!is.null(model) && !is.data.frame(model) && !is.function(model) &&
-        !inherits(model, "gym_model")) {
+  if (!is.null(model) && !is.function(model) && !inherits(model, c("data.frame", "gym_model"))) {
     must <- "a model, a data frame of transitions, a function that returns one, or NULL"
     abort_argument(model, must, "model", rlang::current_env())
   }
@@ -136,18 +133,11 @@ gym_env <- function(reset, step, observation_space, action_space, ..., render = 
 # functions, `vectorized`, `parameters`, the values with which each `self` starts, and `wrappers`,
 # see wrap_r_env().
 r_env <- R6Class(
-  c("gym_r_env", "gym_env"),
-  cloneable = FALSE,
+  c("gym_r_env", "gym_env"), cloneable = FALSE,
   public = list(
-    observation_space = NULL,
-    action_space = NULL,
-    single_observation_space = NULL,
-    single_action_space = NULL,
-    num_envs = NULL,
-    vectorization_mode = NULL,
-    autoreset_mode = NULL,
-    spec = NULL,
-    client = NULL,
+    observation_space = NULL, action_space = NULL, single_observation_space = NULL,
+    single_action_space = NULL, num_envs = NULL, vectorization_mode = NULL, autoreset_mode = NULL,
+    spec = NULL, client = NULL,
     initialize = function(definition) {
       traits <- definition$traits
       private$definition <- definition
@@ -165,9 +155,7 @@ r_env <- R6Class(
       check_sub_env_open(private$sub_env)
       check_seed(seed, min = 0)
       check_flag(return_info)
-      if (!is.null(options)) {
-        check_named_list(options)
-      }
+      if (!is.null(options)) check_named_list(options)
       observation <- reset_sub_env(private$sub_env, seed, options, call = rlang::current_env())
       if (return_info) list(observation = observation, info = list()) else observation
     },
@@ -201,7 +189,15 @@ definition_of <- function(env) {
 }
 
 #' Make a sub-environment from functions, with its own `self`
+#'
+#' A single environment has one of these; a vectorised one has all its sub-environments in one.
 #' @param num_envs The number of sub-environments if it is vectorised.
+#' @return An environment: `traits`; `reset`, a function of `seed` and `options` that returns the
+#'   first observation; `step`, a function of an action; `render`, a function without arguments, or
+#'   `NULL`; `takes_options`, whether the user's `reset()` accepts options; `num_envs`, `NULL` if it
+#'   is not vectorised; `generator`, its random generator, `NULL` before first use; `taken`, the
+#'   number of steps in the episode, `NA` before the first reset; `ended`, whether it has ended,
+#'   `NA` after the warning; `closed`.
 #' @noRd
 definition_sub_env <- function(definition, num_envs = NULL) {
   reset <- definition$reset
@@ -211,29 +207,21 @@ definition_sub_env <- function(definition, num_envs = NULL) {
   if (definition$vectorized) {
     num_envs <- num_envs %||% definition$parameters$num_envs %||% vectorized_sub_envs
     check_count(num_envs, call = NULL)
-    num_envs <- as.integer(num_envs)
-    self$num_envs <- num_envs
+    self$num_envs <- num_envs <- as.integer(num_envs)
   }
   takes_options <- "options" %in% names(formals(reset))
   functions <- list(
-    reset = if (takes_options) {
-      function(seed, options) reset(self, options = options)
-    } else {
-      function(seed, options) reset(self)
+    reset = function(seed, options) {
+      if (takes_options) reset(self, options = options) else reset(self)
     },
     step = function(action) step(self, action)
   )
-  for (wrap_around in definition$wrappers) {
-    functions <- wrap_around(functions, num_envs)
-  }
-  new_sub_env(
-    definition$traits,
-    reset = functions$reset,
-    step = functions$step,
-    render = if (!is.null(render)) function() render(self),
-    takes_options = takes_options,
-    num_envs = num_envs
-  )
+  for (wrap_around in definition$wrappers) functions <- wrap_around(functions, num_envs)
+  list2env(parent = emptyenv(), list(
+    traits = definition$traits, reset = functions$reset, step = functions$step,
+    render = if (!is.null(render)) function() render(self), takes_options = takes_options,
+    num_envs = num_envs, generator = NULL, taken = NA_integer_, ended = FALSE, closed = FALSE
+  ))
 }
 
 check_takes <- function(f, arguments, arg = rlang::caller_arg(f), call = rlang::caller_env()) {
@@ -243,12 +231,10 @@ check_takes <- function(f, arguments, arg = rlang::caller_arg(f), call = rlang::
   }
   declared <- formals(args(f))
   if (!"..." %in% names(declared) && length(declared) < length(arguments)) {
-    gym_abort(
-      c(paste0("`", arg, "` must be a function of ", named, ", and this one has ",
-               count_of(length(declared), "argument"), "."),
-        i = paste0("It begins with `function(", paste(arguments, collapse = ", "), ")`.")),
-      class = "gym_error_argument", argument = arg, value = f, call = call
-    )
+    abort_misuse(arg, f, call,
+                 "`{arg}` must be a function of {named}, and this one has
+                  {count_of(length(declared), 'argument')}.",
+                 i = paste0("It begins with `function(", paste(arguments, collapse = ", "), ")`."))
   }
 }
 
@@ -287,7 +273,22 @@ check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
 check_not_shared <- function(values, call = rlang::caller_env()) {
   for (name in names(values)) {
     shared <- shared_object(values[[name]], name)
-    if (!is.null(shared)) abort_shared(shared, name, call)
+    if (is.null(shared)) next
+    object <- shared$object
+    class <- if (is.object(object)) class(object)[[1L]]
+    again <- if (is_playable(object)) {
+      paste0("gym_make(\"", object$spec$id, "\", seed = 1)")
+    } else if (inherits(object, "R6")) {
+      paste0(class, "$new()")
+    } else {
+      "new.env()"
+    }
+    what <- if (is.null(class)) "an environment of R" else paste("an object of class", class)
+    abort_misuse(name, object, call,
+                 "`{shared$path}` is {what}, which all sub-environments would share.",
+                 i = "Let each make its own in `reset`: `if (is.null(self${name})) self${name} <-
+                      {again}`.",
+                 i = "If nothing changes it, the functions can use it without `self`.")
   }
 }
 
@@ -308,24 +309,4 @@ shared_object <- function(value, path) {
       }
     }
   }
-}
-
-abort_shared <- function(shared, name, call) {
-  object <- shared$object
-  class <- if (is.object(object)) class(object)[[1L]]
-  again <- if (is_playable(object)) {
-    paste0("gym_make(\"", object$spec$id, "\", seed = 1)")
-  } else if (inherits(object, "R6")) {
-    paste0(class, "$new()")
-  } else {
-    "new.env()"
-  }
-  what <- if (is.null(class)) "an environment of R" else paste("an object of class", class)
-  gym_abort(
-    c(paste0("`", shared$path, "` is ", what, ", which all sub-environments would share."),
-      i = paste0("Let each make its own in `reset`: `if (is.null(self$", name, ")) self$", name,
-                 " <- ", again, "`."),
-      i = "If nothing changes it, the functions can use it without `self`."),
-    class = "gym_error_argument", argument = name, value = object, call = call
-  )
 }

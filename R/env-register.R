@@ -43,7 +43,10 @@ gym_register <- function(id, entry_point, ..., max_episode_steps = NULL, reward_
     must <- "a string of letters, digits and `_.:/-`, such as \"Corridor-v0\""
     abort_argument(id, must, "id", rlang::current_env())
   }
-  check_entry_point(entry_point)
+  if (!inherits(entry_point, "gym_r_env") && !is.function(entry_point)) {
+    must <- "an environment of `gym_env()`, or a function that returns an environment"
+    abort_argument(entry_point, must, "entry_point", rlang::current_env())
+  }
   arguments <- list(...)
   check_dots_named(arguments, "size = 5")
   check_not_shared(arguments)
@@ -69,21 +72,12 @@ gym_unregister <- function(id) {
   check_string(id)
   known <- names(the_session$environments)
   if (!id %in% known) {
-    gym_abort(
-      c(paste0("No environment written in R is registered as \"", id, "\"."),
-        i = did_you_mean(id, known, "\"%s\"")),
-      class = "gym_error_argument", argument = "id", value = id
-    )
+    abort_misuse("id", id, rlang::current_env(),
+                 "No environment written in R is registered as \"{id}\".",
+                 i = did_you_mean(id, known, "\"%s\""))
   }
   the_session$environments[[id]] <- NULL
   invisible(id)
-}
-
-check_entry_point <- function(entry_point, call = rlang::caller_env()) {
-  if (!inherits(entry_point, "gym_r_env") && !is.function(entry_point)) {
-    must <- "an environment of `gym_env()`, or a function that returns an environment"
-    abort_argument(entry_point, must, "entry_point", call)
-  }
 }
 
 # Whether the id is registered in this session, which a server cannot know.
@@ -99,47 +93,36 @@ is_registered <- function(x) {
 #' @param arguments The arguments of `entry_point`, and `max_episode_steps`, -1 for no limit.
 #' @noRd
 make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
-  env <- make_entry(bare_id(id), arguments, call)
-  for (wrapper in noted_wrappers(id)) {
-    env <- wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
-  }
-  env
-}
-
-make_entry <- function(id, arguments, call) {
-  registered <- the_session$environments[[id]]
+  registered <- the_session$environments[[bare_id(id)]]
   changes <- registered$changes
   if ("max_episode_steps" %in% names(arguments)) {
-    changes["max_episode_steps"] <- list(own_limit(arguments$max_episode_steps, call))
+    limit <- arguments$max_episode_steps
+    none <- identical(as.numeric(limit), -1)
+    if (!none) check_count(limit, arg = "max_episode_steps", call = call)
+    changes["max_episode_steps"] <- list(if (!none) as.integer(limit))
     arguments$max_episode_steps <- NULL
   }
   check_not_shared(arguments, call = call)
   given <- registered$arguments
   given[names(arguments)] <- arguments
-  entry_point <- registered$entry_point
-  if (inherits(entry_point, "gym_r_env")) {
-    return(change_r_env(entry_point, changes, given, id, call))
+  env <- registered$entry_point
+  if (!inherits(env, "gym_r_env")) {
+    known <- names(formals(args(env)))
+    strange <- if (!"..." %in% known) setdiff(names(given), known)
+    from <- "those of the `entry_point` that it was given"
+    refuse_argument(strange, known, bare_id(id), from, call)
+    env <- with_generator(new_generator(0L), do.call(env, given))
+    given <- list()
+    if (!is_playable(env)) {
+      abort_misuse("entry_point", env, call,
+                   "The `entry_point` of {bare_id(id)} must return an environment, not
+                    {describe_argument(env)}.",
+                   i = "Make one by `gym_env()`.")
+    }
   }
-  known <- names(formals(args(entry_point)))
-  strange <- if (!"..." %in% known) setdiff(names(given), known)
-  refuse_argument(strange, known, id, "those of the `entry_point` that it was given", call)
-  env <- with_generator(new_generator(0L), do.call(entry_point, given))
-  if (!is_playable(env)) {
-    gym_abort(
-      c(paste0("The `entry_point` of ", id, " must return an environment, not ",
-               describe_argument(env), "."),
-        i = "Make one by `gym_env()`."),
-      class = "gym_error_argument", argument = "entry_point", value = env, call = call
-    )
-  }
-  if (inherits(env, "gym_r_env")) change_r_env(env, changes, list(), id, call) else env
-}
-
-own_limit <- function(max_episode_steps, call) {
-  if (identical(as.numeric(max_episode_steps), -1)) {
-    return(NULL)
-  }
-  as.integer(check_count(max_episode_steps, call = call))
+  if (inherits(env, "gym_r_env")) env <- change_r_env(env, changes, given, bare_id(id), call)
+  for (wrapper in noted_wrappers(id)) env <- wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
+  env
 }
 
 # Another environment with the same functions and other values.
@@ -161,12 +144,9 @@ check_parameters <- function(given, definition, id, call = rlang::caller_env()) 
 
 refuse_argument <- function(strange, known, id, from, call) {
   if (length(strange)) {
-    gym_abort(
-      c(paste0(id, " has no argument `", strange[[1L]], "`."),
-        i = did_you_mean(strange[[1L]], c(known, arguments_of(passed_on_by(strange[[1L]])))) %||%
-          paste0("Its arguments are ", from, ".")),
-      class = "gym_error_argument", argument = strange[[1L]], call = call
-    )
+    near <- did_you_mean(strange[[1L]], c(known, arguments_of(passed_on_by(strange[[1L]]))))
+    abort_misuse(strange[[1L]], NULL, call, "{id} has no argument `{strange[[1L]]}`.",
+                 i = near %||% paste0("Its arguments are ", from, "."))
   }
 }
 
@@ -179,7 +159,13 @@ make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., ca
   env <- make_registered(id, arguments, call)
   id <- format(id)
   if (!is.null(num_envs)) {
-    env <- with_num_envs(env, num_envs, id, call)
+    if (!isTRUE(definition_of(env)$vectorized)) {
+      abort_misuse("num_envs", num_envs, call,
+                   "`num_envs = {num_envs}` needs functions for all sub-environments at once, but
+                    those of {id} are for one.",
+                   i = "`rollout()` and searches play several copies of it, see their `num_envs`.")
+    }
+    env <- change_r_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
   }
   if (!is.null(seed) && inherits(env, "gym_r_env")) {
     sub_env <- sub_env_of(env)
@@ -192,34 +178,11 @@ make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., ca
 check_for_r <- function(id, servers, call = rlang::caller_env()) {
   given <- names(servers)[lengths(servers) > 0L]
   if (length(given)) {
-    gym_abort(
-      c(paste0("`", given[[1L]], "` is for an environment on a server, and ", format(id),
-               " is written in R."),
-        i = "Leave it out."),
-      class = "gym_error_argument", argument = given[[1L]], value = servers[[given[[1L]]]],
-      call = call
-    )
+    abort_misuse(given[[1L]], servers[[given[[1L]]]], call,
+                 "`{given[[1L]]}` is for an environment on a server, and {format(id)} is written in
+                  R.",
+                 i = "Leave it out.")
   }
-}
-
-with_num_envs <- function(env, num_envs, id, call) {
-  if (!isTRUE(definition_of(env)$vectorized)) {
-    gym_abort(
-      c(paste0("`num_envs = ", num_envs, "` needs functions for all sub-environments at once, but ",
-               "those of ", id, " are for one."),
-        i = "`rollout()` and searches play several copies of it, see their `num_envs`."),
-      class = "gym_error_argument", argument = "num_envs", value = num_envs, call = call
-    )
-  }
-  change_r_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
-}
-
-#' Convert a registered environment to a vector environment
-#' @noRd
-registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
-                                  call = rlang::caller_env()) {
-  env <- make_registered(id, arguments, call)
-  as_vector_env(env, num_envs, max_envs = max_envs, frames = frames)
 }
 
 # In the registry ----------------------------------------------------------------------
@@ -229,39 +192,102 @@ registered_vector_env <- function(id, num_envs, arguments, max_envs, frames,
 #' @noRd
 registered_rows <- function(search = NULL) {
   ids <- as.character(names(the_session$environments))
-  if (!is.null(search)) {
-    ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
-  }
-  specs <- lapply(ids, registered_spec)
+  if (!is.null(search)) ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
+  # The part of the spec that is known without making the environment.
+  specs <- lapply(the_session$environments[ids], function(registered) {
+    made <- inherits(registered$entry_point, "gym_r_env")
+    utils::modifyList(as.list(if (made) registered$entry_point$spec), registered$changes)
+  })
   is_vectorized <- function(registered) isTRUE(definition_of(registered$entry_point)$vectorized)
   data.frame(
     id = ids,
     max_episode_steps = vapply(specs, function(spec) spec$max_episode_steps %||% NA_integer_, 0L),
     reward_threshold = vapply(specs, function(spec) as.numeric(spec$reward_threshold %||% NA), 0),
-    vectorised = vapply(the_session$environments[ids], is_vectorized, NA, USE.NAMES = FALSE),
-    extra = rep(NA_character_, length(ids)),
-    available = rep(TRUE, length(ids)),
-    reason = rep(NA_character_, length(ids))
+    vectorised = vapply(the_session$environments[ids], is_vectorized, NA),
+    extra = rep(NA_character_, length(ids)), available = rep(TRUE, length(ids)),
+    reason = rep(NA_character_, length(ids)), row.names = NULL
   )
-}
-
-# The part of the spec that is known without making the environment.
-registered_spec <- function(id) {
-  registered <- the_session$environments[[id]]
-  spec <- if (inherits(registered$entry_point, "gym_r_env")) registered$entry_point$spec
-  spec <- as.list(spec)
-  spec[names(registered$changes)] <- registered$changes
-  spec
 }
 
 # A server has no access to an environment written in R.
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
     id <- bare_id(env_id)
-    gym_abort(
-      c(paste0(id, " is an environment written in R, which a server cannot make."),
-        i = paste0("`gym_make(\"", id, "\")` makes it here.")),
-      class = "gym_error_argument", argument = "env_id", value = env_id, call = call
-    )
+    abort_misuse("env_id", env_id, call,
+                 "{id} is an environment written in R, which a server cannot make.",
+                 i = "`gym_make(\"{id}\")` makes it here.")
   }
+}
+
+#' List the available environments
+#'
+#' List the environments that the server can make, those that require an extra (see
+#' [gym_server_install()]), some that it cannot make at all, and the environments in R that this
+#' session has registered (see [gym_register()]).
+#'
+#' @param client A client. The default is the session's client, [gym_client()].
+#' @param search A text to look for in the ids, ignoring case. If there is no match, similar ids are
+#'   listed. `NULL`, the default, lists all.
+#' @return A data frame with one row for each environment: `id` (a string), `max_episode_steps`
+#'   (integer, the limit of an episode, `NA` for none), `reward_threshold` (double, the mean return
+#'   from which it counts as solved, `NA` for none), `vectorised` (logical, whether it has its own
+#'   vector implementation), `extra` (a string, the extra of the server that it requires, such as
+#'   `"box2d"`, `NA` for none), `available` (logical, whether it can be made) and `reason` (a
+#'   string, why it cannot be made, or `NA`; older servers give none).
+#' @section Errors: `gym_error_argument`, `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' nrow(env_registry())
+#' env_registry(search = "cartpole")
+#' env_registry(search = "FrozenLaek")$id
+env_registry <- function(client = gym_client(), search = NULL) {
+  check_client(client)
+  check_string(search, allow_null = TRUE)
+  route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
+  environments <- get_answer(client, route)$environments
+  servers <- data.frame(
+    id = listed_texts(environments, "id", ""),
+    max_episode_steps = listed_counts(environments, "max_episode_steps"),
+    reward_threshold = listed_numbers(environments, "reward_threshold"),
+    vectorised = listed_flags(environments, "vectorised"),
+    extra = listed_texts(environments, "extra"),
+    available = listed_flags(environments, "available"),
+    reason = listed_texts(environments, "reason")
+  )
+  own <- registered_rows(search)
+  rbind(servers[!servers$id %in% own$id, ], own, make.row.names = FALSE)
+}
+
+# The environments that were made ---------------------------------------------------------
+
+#' List the environments on a server
+#'
+#' For a server that several sessions share: list its environments with their names, age and last
+#' use. [env_list_all()] returns only their ids.
+#'
+#' @inheritParams env_registry
+#' @return A data frame with one row for each environment of all clients, the oldest first:
+#'   `instance_id` (a string, for [env_close()] and the other classic calls), `name` (a string,
+#'   given by its owner in [gym_make()] or [env_create()], or `NA`), `env_id` (a string), `num_envs`
+#'   (integer, the number of sub-environments, `NA` for a single environment), `age` and `idle`
+#'   (double, the seconds since it was made and since it was last reset or stepped), `steps`
+#'   (double, the number of steps, in all sub-environments together) and `watched` (logical, whether
+#'   somebody watches it).
+#' @section Errors: `gym_error_argument`, `gym_error_connection`.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' env <- gym_make("CartPole-v1", name = "first try")
+#' env_list()
+#' env$close()
+env_list <- function(client = gym_client()) {
+  check_client(client)
+  close_queued(client)
+  instances <- get_answer(client, "/v1/instances/")$instances
+  data.frame(
+    instance_id = listed_texts(instances, "instance_id", ""),
+    name = listed_texts(instances, "name"), env_id = listed_texts(instances, "env_id", ""),
+    num_envs = listed_counts(instances, "num_envs"), age = listed_numbers(instances, "age_seconds"),
+    idle = listed_numbers(instances, "idle_seconds"), steps = listed_numbers(instances, "steps"),
+    watched = listed_flags(instances, "watched")
+  )
 }

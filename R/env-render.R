@@ -85,12 +85,10 @@ format.gym_frames <- function(x, ...) {
 check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
-    gym_abort(
-      c(paste0("Only an environment without sub-environments can keep frames, but this ", label,
-               " has ", count_of(env$num_envs, "sub-environment"), "."),
-        i = paste0("Make it without `num_envs`, or give its id instead.")),
-      class = "gym_error_argument", argument = "env", value = env, call = call
-    )
+    abort_misuse("env", env, call,
+                 "Only an environment without sub-environments can keep frames, but this {label} has
+                  {count_of(env$num_envs, 'sub-environment')}.",
+                 i = "Make it without `num_envs`, or give its id instead.")
   }
   draws <- FALSE
   if (is_server_env(env)) {
@@ -98,11 +96,8 @@ check_draws <- function(env, call) {
     draws <- known_instance(env$client, env$instance_id, call = call)$draws
   }
   if (!draws) {
-    gym_abort(
-      c(paste0("There are no frames to keep: ", label, " cannot be drawn."),
-        i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations."),
-      class = "gym_error_argument", argument = "frames", value = TRUE, call = call
-    )
+    abort_misuse("frames", TRUE, call, "There are no frames to keep: {label} cannot be drawn.",
+                 i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations.")
   }
 }
 

@@ -82,17 +82,12 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   if (!fits_space(space, value)) {
     return(FALSE)
   }
-  json <- if (is.null(num_envs)) {
-    write_value(space, value)
-  } else {
-    write_batch(single, value, num_envs)
-  }
-  fields <- c(value = json)
-  answer <- post_answer(x, paste0(instance$route, which, "/contains"), fields, call = call)
-  if (!rlang::is_bool(answer$member)) {
-    refuse_field(answer$member, "member", "true or false")
-  }
-  answer$member
+  single_one <- is.null(num_envs)
+  json <- if (single_one) write_value(space, value) else write_batch(single, value, num_envs)
+  route <- paste0(instance$route, which, "/contains")
+  member <- post_answer(x, route, c(value = json), call = call)$member
+  if (!rlang::is_bool(member)) refuse_field(member, "member", "true or false")
+  member
 }
 
 # Environments named by their id ----------------------------------------------------
@@ -111,8 +106,7 @@ known_spaces <- function(env, client, call = rlang::caller_env()) {
   }
   list(
     observation_space = env$single_observation_space %||% env$observation_space,
-    action_space = env$single_action_space %||% env$action_space,
-    spec = env$spec
+    action_space = env$single_action_space %||% env$action_space, spec = env$spec
   )
 }
 
@@ -122,7 +116,11 @@ close_quietly <- function(env) tryCatch(env$close(), gym_error = function(cnd) N
 
 check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   named <- rlang::is_string(x) && !is.na(x) && nzchar(x)
-  if (!named && !is_playable(x) && !has_vector_env_method(x)) {
+  # Is there a method of `as_vector_env()` for the object's own class?
+  has_method <- function(class) {
+    !is.null(utils::getS3method("as_vector_env", class, optional = TRUE))
+  }
+  if (!named && !is_playable(x) && !(is.object(x) && any(vapply(.class2(x), has_method, NA)))) {
     must <- "the id of an environment or an environment made by `gym_make()`"
     hint <- if (inherits(x, c("gym_training", "gym_rollout")) && length(x$env_id)) {
       paste0("The environment comes first, then what plays in it: `\"", x$env_id,
@@ -131,14 +129,6 @@ check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::calle
     abort_argument(x, must, arg, call, hint)
   }
   invisible(x)
-}
-
-# Is there a method of `as_vector_env()` for the object's own class?
-has_vector_env_method <- function(x) {
-  methods <- lapply(if (is.object(x)) .class2(x), function(class) {
-    utils::getS3method("as_vector_env", class, optional = TRUE)
-  })
-  !all(vapply(methods, is.null, NA))
 }
 
 is_playable <- function(x) {

@@ -23,10 +23,9 @@ wrap_transform_reward <- function(traits, func, call) {
       paste0(reward[[at]], if (n > 1L) paste0(" in row ", at))
     }
     if (!is.null(wrong)) {
-      abort_transform(transform, paste0(
-        "must return a finite number for ",
-        if (n > 1L) paste("each of", n, "rewards") else "one reward", ", not ", wrong
-      ), reward)
+      rewards <- if (n > 1L) paste("each of", n, "rewards") else "one reward"
+      problem <- paste0("must return a finite number for ", rewards, ", not ", wrong)
+      abort_transform(transform, problem, reward)
     }
     as.numeric(reward)
   }
@@ -65,8 +64,7 @@ wrap_transform_reward <- function(traits, func, call) {
 
 wrap_transform_observation <- function(traits, func, observation_space = NULL, call) {
   transform <- new_transform("TransformObservation", func, traits, call)
-  changed <- change_spaces(traits, observation_space = observation_space %||%
-                             traits$observation_space, call = call)
+  changed <- change_spaces(traits, observation_space %||% traits$observation_space, call = call)
   space <- changed$observation_space
   fit <- function(observation, n) {
     check_names_order(transform, space, observation)
@@ -180,8 +178,7 @@ around_batches <- function(inside, outside, around) {
       return(around(inner, num_envs, identical(env$autoreset_mode, "NextStep")))
     }
     of_one <- convert_functions(
-      inner,
-      observation = function(value) batch_of(inside$observation_space, list(value)),
+      inner, observation = function(value) batch_of(inside$observation_space, list(value)),
       action = function(batch) batch_value(inside$action_space, batch, 1L)
     )
     convert_functions(
@@ -225,7 +222,13 @@ new_transform <- function(wrapper, func, traits, call) {
     })
     fit(value, n)
   }
-  transform$hint <- transform_hint(asked, traits$observation_space)
+  space <- traits$observation_space
+  rows <- if ("observation" %in% asked && length(space$shape) == 1L) {
+    name <- if (is.null(space$names)) 1L else paste0("\"", space$names[[1L]], "\"")
+    paste0(": `observation[, ", name, "]` has a number for each, `observation[1]` only one")
+  }
+  transform$hint <- paste0("It gets a batch, with a row for each sub-environment", rows,
+                           "; `ifelse()` chooses for each, `if` cannot.")
   calls <- 0
   compared_at <- 2^(0:10)
   transform$ask <- function(parts, n, fit) {
@@ -235,7 +238,12 @@ new_transform <- function(wrapper, func, traits, call) {
     value <- answer(parts, n, fit)
     # Random numbers for a row alone would differ.
     if (compares && identical(session_random_state(), before)) {
-      alone <- answer(last_row(parts[asked], n, traits), 1L, fit)
+      last_row <- function(part, name) {
+        space <- switch(sub("next_", "", name), action = traits$action_space,
+                        observation = traits$observation_space)
+        if (is.null(space)) part[[n]] else batch_rows(space, part, n)
+      }
+      alone <- answer(Map(last_row, parts[asked], asked), 1L, fit)
       if (differs_alone(transform, value, alone, n)) compared_at <<- NULL
     }
     value
@@ -265,26 +273,13 @@ asked_parts <- function(wrapper, func, call) {
     }
   }
   if (length(needed) || !length(asked)) {
-    gym_abort(
-      c(paste0("`func` of ", wrapper, " must be a function of `", known[[1L]], "`, and this one ",
-               if (length(needed)) paste0("needs `", needed[[1L]], "`.") else "has no argument."),
-        i = paste0("The names of its arguments can be `",
-                   paste(known, collapse = "`, `"), "`.")),
-      class = "gym_error_argument", argument = "func", value = func, call = call
-    )
+    problem <- if (length(needed)) paste0("needs `", needed[[1L]], "`") else "has no argument"
+    abort_misuse("func", func, call,
+                 "`func` of {wrapper} must be a function of `{known[[1L]]}`, and this one
+                  {problem}.",
+                 i = "The names of its arguments can be {quoted_names(known)}.")
   }
   stats::setNames(asked, asked)
-}
-
-last_row <- function(parts, n, traits) {
-  row <- function(part, name) {
-    space <- switch(
-      name, action = traits$action_space, observation = , next_observation =
-        traits$observation_space
-    )
-    if (is.null(space)) part[[n]] else batch_rows(space, part, n)
-  }
-  Map(row, parts, names(parts))
 }
 
 # A function that takes `observation[1]` for a number of its own row would return wrong numbers
@@ -294,11 +289,10 @@ differs_alone <- function(transform, value, alone, n) {
   among <- numbers(if (is.list(value)) lapply(value, rows_of, n) else rows_of(value, n))
   differs <- !isTRUE(all.equal(among, numbers(alone)))
   if (differs) {
+    values <- c(describe_value(numbers(alone)), describe_value(among))
     rlang::warn(
       c(paste0("`func` of ", transform$wrapper, " gives a row another value when it is alone (",
-               describe_value(numbers(alone)), ") than among others (", describe_value(among),
-               ")."),
-        i = transform$hint),
+               values[[1L]], ") than among others (", values[[2L]], ")."), i = transform$hint),
       class = "gym_warning_wrapper", call = NULL
     )
   }
@@ -322,11 +316,10 @@ form_batch <- function(space, value, n) {
 check_names_order <- function(transform, space, observation) {
   given <- colnames(observation) %||% names(observation)
   if (!is.null(given) && setequal(given, space$names) && !identical(given, space$names)) {
-    abort_transform(
-      transform, paste0("returned ", few_names(given), " for observations with the numbers ",
-                        few_names(space$names)),
-      observation, fix = "If their order is to change, give the new `observation_space`."
-    )
+    problem <- paste0("returned ", few_names(given), " for observations with the numbers ",
+                      few_names(space$names))
+    abort_transform(transform, problem, observation,
+                    fix = "If their order is to change, give the new `observation_space`.")
   }
 }
 
@@ -334,15 +327,14 @@ refuse_misfit <- function(transform, space, value, n, arg, given) {
   tryCatch(
     check_batch(space, batch_space(space, n), value, n, NULL, bounds = TRUE),
     gym_error_space = function(cnd) {
-      abort_transform(
-        transform,
-        paste0("must return ", count_of(n, sub("_space", "", arg)), " of ", format(space), ", not ",
-               describe_argument(value), ": ", sub("[.]$", "", first_line(cnd))),
-        value, parent = cnd, class = "gym_error_space",
-        fix = if (arg == "observation_space" && is.null(given)) {
-          "If it changes the space of observations, give the new one as `observation_space`."
-        }
+      problem <- paste0(
+        "must return ", count_of(n, sub("_space", "", arg)), " of ", format(space), ", not ",
+        describe_argument(value), ": ", sub("[.]$", "", first_line(cnd))
       )
+      fix <- if (arg == "observation_space" && is.null(given)) {
+        "If it changes the space of observations, give the new one as `observation_space`."
+      }
+      abort_transform(transform, problem, value, "gym_error_space", fix, parent = cnd)
     }
   )
 }
@@ -354,13 +346,4 @@ abort_transform <- function(transform, problem, value = NULL, class = "gym_error
     class = c("gym_error_wrapper", class), wrapper = transform$wrapper, argument = "func",
     value = value, ..., call = NULL
   )
-}
-
-transform_hint <- function(asked, space) {
-  rows <- if ("observation" %in% asked && length(space$shape) == 1L) {
-    name <- if (is.null(space$names)) 1L else paste0("\"", space$names[[1L]], "\"")
-    paste0(": `observation[, ", name, "]` has a number for each, `observation[1]` only one")
-  }
-  paste0("It gets a batch, with a row for each sub-environment", rows,
-         "; `ifelse()` chooses for each, `if` cannot.")
 }

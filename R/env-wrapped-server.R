@@ -3,13 +3,11 @@
 # Wraps an environment of a server, which stays the same instance.
 wrap_server_env <- function(env, wrapper, arguments, call) {
   if (!wrapper %in% names(transforms)) {
-    gym_abort(
-      c(paste0("Wrappers such as ", wrapper, " are applied by the server when it makes the ",
-               "environment, and this one is made."),
-        i = paste0("`gym_make(gym_wrap(\"", env$spec$id, "\", \"", wrapper, "\"))` makes one; ",
-                   "around one that is made go ", paste(names(transforms), collapse = ", "), ".")),
-      class = "gym_error_argument", argument = "wrapper", value = wrapper, call = call
-    )
+    abort_misuse("wrapper", wrapper, call,
+                 "Wrappers such as {wrapper} are applied by the server when it makes the
+                  environment, and this one is made.",
+                 i = "`gym_make(gym_wrap(\"{env$spec$id}\", \"{wrapper}\"))` makes one; around one
+                      that is made go {toString(names(transforms))}.")
   }
   traits <- new_traits(env$single_observation_space, env$single_action_space, env$spec$id)
   traits$spec <- env$spec
@@ -19,9 +17,7 @@ wrap_server_env <- function(env, wrapper, arguments, call) {
 }
 
 wrapped_server_env <- R6Class(
-  c("gym_wrapped_server_env", "gym_server_env", "gym_env"),
-  inherit = server_env,
-  cloneable = FALSE,
+  c("gym_wrapped_server_env", "gym_server_env", "gym_env"), inherit = server_env, cloneable = FALSE,
   public = list(
     initialize = function(env, made, renames) {
       traits <- made$traits
@@ -97,51 +93,24 @@ wrapped_server_env <- R6Class(
 #' @noRd
 split_wrappers <- function(wrappers, call) {
   in_r <- wrapper_names(wrappers) %in% names(transforms)
-  check_takes_function(wrappers[!in_r], call)
+  # A function cannot be sent to the server.
+  takes_function <- function(wrapper) any(vapply(wrapper, is.function, NA))
+  wrong <- Filter(takes_function, wrappers[!in_r])
+  if (length(wrong)) {
+    name <- wrong[[1L]][[1L]]
+    abort_misuse("wrapper", name, call, "The wrapper {name} does not take an R function.",
+                 i = did_you_mean(name, names(transforms), "%s"),
+                 i = "These do: {toString(names(transforms))}.")
+  }
   late <- which(!in_r & cumsum(in_r) > 0L)
   if (length(late)) {
     names <- c(wrappers[[late[[1L]]]][[1L]], wrappers[[which(in_r)[[1L]]]][[1L]])
-    gym_abort(
-      c(paste0(names[[1L]], " is applied on the server, inside of ", names[[2L]],
-               ", which is applied in R."),
-        i = paste0("Write it before ", names[[2L]], ".")),
-      class = "gym_error_argument", argument = "wrapper", value = names[[1L]], call = call
-    )
+    abort_misuse("wrapper", names[[1L]], call,
+                 "{names[[1L]]} is applied on the server, inside of {names[[2L]]}, which is applied
+                  in R.",
+                 i = "Write it before {names[[2L]]}.")
   }
   list(server = wrappers[!in_r], r = wrappers[in_r])
 }
 
-# A function cannot be sent to the server.
-check_takes_function <- function(wrappers, call) {
-  wrong <- Filter(function(wrapper) any(vapply(wrapper, is.function, NA)), wrappers)
-  if (length(wrong)) {
-    name <- wrong[[1L]][[1L]]
-    gym_abort(
-      c(paste0("The wrapper ", name, " does not take an R function."),
-        i = did_you_mean(name, names(transforms), "%s"),
-        i = paste0("These do: ", paste(names(transforms), collapse = ", "), ".")),
-      class = "gym_error_argument", argument = "wrapper", value = name, call = call
-    )
-  }
-}
-
 calls_r <- function(env) any(wrapper_names(noted_wrappers(env)) %in% names(transforms))
-
-# The same environment without the wrappers that are applied in R.
-without_transforms <- function(env_id) {
-  if (!calls_r(env_id)) {
-    return(env_id)
-  }
-  with_wrappers(env_id$env_id, split_wrappers(env_id$wrappers, NULL)$server)
-}
-
-check_no_transforms <- function(wrappers, call) {
-  name <- intersect(wrapper_names(wrappers), names(transforms))
-  if (length(name)) {
-    gym_abort(
-      c(paste0(name[[1L]], " calls an R function, which an instance on a server cannot do."),
-        i = "Use `gym_make()` instead of the classic calls."),
-      class = "gym_error_argument", argument = "wrappers", value = name, call = call
-    )
-  }
-}

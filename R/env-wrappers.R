@@ -81,15 +81,11 @@ gym_wrap <- function(env_id, wrapper, ...) {
     kwargs, if (calls_r) "func = function(reward) reward / 10" else "max_episode_steps = 50"
   )
   if (is.environment(env_id) || is.list(env_id) && !inherits(env_id, "gym_wrapped")) {
-    if (is_server_env(env_id)) {
-      return(wrap_server_env(env_id, wrapper, kwargs, rlang::current_env()))
-    }
-    return(wrap_r_env(env_id, wrapper, kwargs, rlang::current_env()))
+    wrap <- if (is_server_env(env_id)) wrap_server_env else wrap_r_env
+    return(wrap(env_id, wrapper, kwargs, rlang::current_env()))
   }
   registered <- is_registered(env_id)
-  if (registered) {
-    check_r_wrapper(wrapper, rlang::current_env())
-  }
+  if (registered) check_r_wrapper(wrapper, rlang::current_env())
   if (calls_r) {
     check_wrapper_arguments(wrapper, kwargs, rlang::current_env())
     asked_parts(wrapper, kwargs$func, rlang::current_env())
@@ -131,7 +127,7 @@ remembering <- function(names) {
 # The name of an environment in prints, with the wrappers around it: returns depend on these, too.
 wrapped_id <- function(env_id, wrappers) paste(c(env_id, wrappers), collapse = " |> ")
 
-# The same of the environment of a result or of a policy; `NULL` if it is unknown.
+# The same name, for the environment of a result or a policy; `NULL` if it is unknown.
 env_text <- function(x) if (!is.null(x$env_id)) wrapped_id(x$env_id, wrappers_around(x))
 
 wrappers_around <- function(x) x$wrappers %||% x$provenance$wrappers
@@ -149,7 +145,13 @@ env_names <- function(results) {
 
 #' @export
 format.gym_wrapped <- function(x, ...) {
-  paste(c(x$env_id, vapply(x$wrappers, wrapper_text, "")), collapse = " |> ")
+  text <- function(value) if (inherits(value, "gym_space")) format(value) else describe_value(value)
+  wrappers <- vapply(x$wrappers, function(wrapper) {
+    values <- vapply(wrapper[-1L], text, "")
+    arguments <- paste(names(wrapper)[-1L], values, sep = " = ", recycle0 = TRUE, collapse = ", ")
+    paste0(wrapper[[1L]], "(", arguments, ")")
+  }, "")
+  paste(c(x$env_id, wrappers), collapse = " |> ")
 }
 
 #' @export
@@ -158,33 +160,22 @@ print.gym_wrapped <- function(x, ...) {
   invisible(x)
 }
 
-wrapper_text <- function(wrapper) {
-  text <- function(value) if (inherits(value, "gym_space")) format(value) else describe_value(value)
-  values <- vapply(wrapper[-1L], text, "")
-  arguments <- paste(names(wrapper)[-1L], values, sep = " = ", recycle0 = TRUE, collapse = ", ")
-  paste0(wrapper[[1L]], "(", arguments, ")")
-}
-
 check_wrappers <- function(wrappers, call = rlang::caller_env()) {
+  # A wrapper is a list of its name and its arguments, which have names.
+  is_wrapper <- function(x) {
+    is.list(x) && length(x) > 0L && rlang::is_string(x[[1L]]) &&
+      (length(x) == 1L || rlang::is_named(x[-1L]))
+  }
   if (!is.list(wrappers) || !all(vapply(wrappers, is_wrapper, NA))) {
     must <- "a list of lists such as list(\"TimeLimit\", max_episode_steps = 50)"
     abort_argument(wrappers, must, "wrappers", call)
   }
 }
 
-# A wrapper is a list of its name and its arguments, which have names.
-is_wrapper <- function(x) {
-  is.list(x) && length(x) > 0L && rlang::is_string(x[[1L]]) &&
-    (length(x) == 1L || rlang::is_named(x[-1L]))
-}
-
 wrappers_json <- function(wrappers) {
   json_array(vapply(wrappers, function(wrapper) {
-    kwargs <- wrapper[-1L]
-    json_object(c(
-      name = json_string(wrapper[[1L]]),
-      kwargs = if (length(kwargs)) to_json(kwargs)
-    ))
+    kwargs <- if (length(wrapper) > 1L) to_json(wrapper[-1L])
+    json_object(c(name = json_string(wrapper[[1L]]), kwargs = kwargs))
   }, ""))
 }
 
@@ -239,29 +230,25 @@ check_wrapper_arguments <- function(wrapper, arguments, call) {
   strange <- setdiff(names(arguments), known)
   needed <- known[vapply(formals(make)[known], is_without_default, NA)]
   lacking <- setdiff(needed, names(arguments))
-  if (length(strange) || length(lacking)) {
-    has <- if (length(known)) paste0("its arguments are `", paste(known, collapse = "`, `"), "`")
-    gym_abort(
-      paste0(
-        wrapper,
-        if (length(strange)) " has no argument `" else " needs the argument `",
-        c(strange, lacking)[[1L]], "`: ", has %||% "it has none", "."
-      ),
-      class = "gym_error_argument", argument = c(strange, lacking)[[1L]], call = call
-    )
+  wrong <- c(strange, lacking)
+  if (length(wrong)) {
+    does <- if (length(strange)) "has no argument" else "needs the argument"
+    has <- if (length(known)) paste("its arguments are", quoted_names(known)) else "it has none"
+    abort_misuse(wrong[[1L]], NULL, call, "{wrapper} {does} `{wrong[[1L]]}`: {has}.")
   }
 }
 
 is_without_default <- function(formal) rlang::is_missing(formal)
 
 check_r_wrapper <- function(wrapper, call) {
-  check_wrapper_has_not_ended(wrapper, call)
+  if (wrapper %in% names(ended_wrappers)) {
+    replacement <- paste0("give the function to the wrapper \"", ended_wrappers[[wrapper]], "\"")
+    abort_defunct(replacement, paste0("\"", wrapper, "\" around environments written in R"), call)
+  }
   if (!wrapper %in% names(r_wrappers)) {
-    gym_abort(
-      c(paste0("There is no wrapper \"", wrapper, "\" for environments written in R."),
-        i = paste0("There are ", paste(names(r_wrappers), collapse = ", "), ".")),
-      class = "gym_error_argument", argument = "wrapper", value = wrapper, call = call
-    )
+    abort_misuse("wrapper", wrapper, call,
+                 "There is no wrapper \"{wrapper}\" for environments written in R.",
+                 i = paste0("There are ", paste(names(r_wrappers), collapse = ", "), "."))
   }
 }
 

@@ -16,14 +16,10 @@ find_uv <- function(call = rlang::caller_env(), timeout = 30) {
   uv <- path.expand(named)
   if (file.exists(uv)) uv <- absolute_path(uv)
   if (!uv_works(uv, timeout)) {
-    gym_abort(
-      c(
-        paste0("The variable GYM_UV names ", named, ", which is not a usable uv."),
-        i = paste0("It must be the path of uv ", least_uv, " or newer."),
-        i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for."
-      ),
-      class = "gym_error_install", call = call
-    )
+    abort_misuse(NULL, named, call, class = "gym_error_install",
+                 "The variable GYM_UV names {named}, which is not a usable uv.",
+                 i = "It must be the path of uv {least_uv} or newer.",
+                 i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for.")
   }
   uv
 }
@@ -76,15 +72,14 @@ uv_release <- list(
 uv_target <- function() {
   parts <- strsplit(system_name(), "-", fixed = TRUE)[[1L]]
   processor <- sub("arm64", "aarch64", parts[[2L]], fixed = TRUE)
+  musl <- list.files("/lib", "^ld-musl-")
   paste0(processor, switch(parts[[1L]],
-    linux = if (has_musl()) "-unknown-linux-musl" else "-unknown-linux-gnu",
+    linux = if (length(musl)) "-unknown-linux-musl" else "-unknown-linux-gnu",
     darwin = "-apple-darwin",
     windows = "-pc-windows-msvc",
     paste0("-", parts[[1L]])
   ))
 }
-
-has_musl <- function() length(list.files("/lib", "^ld-musl-")) > 0L
 
 pinned_uv <- function() file.path(install_root(), "uv", uv_release$version, uv_name())
 
@@ -201,8 +196,7 @@ abort_uv <- function(what, output, call, more = NULL) {
   }
   gym_abort(
     c(
-      paste0(what, "."),
-      x = if (length(shown)) paste(shown, collapse = "\n"),
+      paste0(what, "."), x = if (length(shown)) paste(shown, collapse = "\n"),
       install_advice(output$text), more,
       i = "What was downloaded is kept; `gym_server_install()` continues from here."
     ),

@@ -1,6 +1,6 @@
-# A function that changes nothing plays a batch of episodes. The result depends only on the
-# environment, the policy, the seeds and the random stream. So a lost batch can be played again, in
-# any order and on any worker.
+# play_batch() plays a batch of episodes and keeps nothing from one batch to the next. Its result
+# depends only on the environment, the policy, the seeds and the random stream. So a lost batch can
+# be played again, in any order and on any worker.
 #
 # Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch; this is fixed
 # before the first step. If the next episode went to whichever sub-environment ends first and
@@ -56,9 +56,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   together <- if (vector_env$one_seed) at_once else n
   play <- function() {
     for (first in seq(1L, n, by = together)) {
-      if (first <= batch$needed) {
-        play_episodes(batch, first, min(n, first + together - 1L))
-      }
+      if (first <= batch$needed) play_episodes(batch, first, min(n, first + together - 1L))
     }
   }
   with_generator(new_generator(stream = stream), naming_call(play(), vector_env))
@@ -80,21 +78,19 @@ naming_call <- function(code, vector_env) {
       if (!inherits(cnd, "gym_error") && is_about_one(cnd)) abort_about_one(cnd, vector_env)
     },
     gym_error = function(cnd) {
-      if (!is_own_step(cnd$call)) return()
+      # Was it raised by a reset or a step of this package, not by one that a user wrote?
+      steps <- list(quote(step), quote(env$step), quote(env$reset))
+      own <- is.null(cnd$call) || any(vapply(steps, identical, NA, cnd$call[[1L]]))
+      if (!own) return()
       cnd["call"] <- list(rlang::error_call(vector_env$call))
       # Errors about an observation name the argument that is to blame.
       if (inherits(cnd, "gym_error_space") && is.null(cnd$argument)) {
-        cnd <- with_hint(cnd, "The policy returned this action.")
+        hint <- rlang::format_error_bullets(c(i = "The policy returned this action."))
+        cnd$message <- paste0(cnd$message, "\n", hint)
       }
       rlang::cnd_signal(cnd)
     }
   )
-}
-
-# Was it raised by a reset or a step of this package, not by one that a user wrote?
-is_own_step <- function(call) {
-  own <- list(quote(step), quote(env$step), quote(env$reset))
-  is.null(call) || any(vapply(own, identical, NA, call[[1L]]))
 }
 
 # Plays the episodes from `first` to `last` of a batch. `playing` is the state that changes with
@@ -118,32 +114,26 @@ play_episodes <- function(batch, first, last) {
   step <- if (whole) vector_env$step else vector_env$step_bare %||% vector_env$step
   while (length(playing$rows$episode)) {
     action <- if (is.null(batch$learner)) {
-      act_batch(
-        playing$acting, playing$observation, length(playing$rows$sub_env), vector_env
-      )
+      act_batch(playing$acting, playing$observation, length(playing$rows$sub_env), vector_env)
     } else {
       batch$learner$act(playing$observation, playing$rows$sub_env)
     }
     stepped <- if (batch$clips) clip_actions(vector_env$action_space, action) else action
     out <- step(stepped, playing$rows$sub_env)
     if (!is.null(batch$learner)) {
-      batch$learner$observe(transitions_of(batch, playing, action, out))
+      rows <- playing$rows
+      # An episode that `max_steps` cuts off is truncated.
+      cut <- playing$taken + 1L - rows$began >= batch$max_steps
+      batch$learner$observe(list(
+        observation = playing$observation, action = action, reward = out$reward,
+        next_observation = out$next_observation, terminated = out$terminated,
+        truncated = (out$truncated | cut) & !out$terminated,
+        first = rows$began == playing$taken, sub_env = rows$sub_env
+      ))
     }
     end_step(batch, playing, action, out)
   }
   add_noted(batch)
-}
-
-# The transitions of a step for a learner. An episode that `max_steps` cuts off is truncated.
-transitions_of <- function(batch, playing, action, out) {
-  rows <- playing$rows
-  cut <- playing$taken + 1L - rows$began >= batch$max_steps
-  list(
-    observation = playing$observation, action = action, reward = out$reward,
-    next_observation = out$next_observation, terminated = out$terminated,
-    truncated = (out$truncated | cut) & !out$terminated,
-    first = rows$began == playing$taken, sub_env = rows$sub_env
-  )
 }
 
 #' Record the results of a step, and start the next episodes
@@ -154,7 +144,14 @@ end_step <- function(batch, playing, action, out) {
   playing$taken <- playing$taken + 1L
   keep_frame(batch, rows$episode)
   playing$rows$return <- rows$return + out$reward
-  if (!is.null(batch$moments)) note_observations(batch, playing)
+  if (!is.null(batch$moments)) {
+    values <- number_rows(playing$observation)
+    batch$noted[[length(batch$noted) + 1L]] <- values
+    # R takes as long to add a few rows to the moments as hundreds, so several steps are added
+    # together. How many depends only on an observation's size.
+    together <- max(1L, min(64L, 8192L %/% ncol(values)))
+    if (playing$taken %% together == 0L) add_noted(batch)
+  }
   if (batch$keep_steps) {
     batch$steps[[length(batch$steps) + 1L]] <- list(
       at = rows$episode, observation = playing$observation, action = action,
@@ -166,9 +163,7 @@ end_step <- function(batch, playing, action, out) {
   ended <- out$terminated | out$truncated
   # After cutting an episode off, the environment does not start the next one itself.
   waiting <- if (isTRUE(batch$vector_env$begins_next)) !ended else TRUE
-  if (batch$max_steps < Inf) {
-    ended <- ended | playing$taken - rows$began >= batch$max_steps
-  }
+  if (batch$max_steps < Inf) ended <- ended | playing$taken - rows$began >= batch$max_steps
   if (any(ended)) {
     length <- (playing$taken - rows$began)[ended]
     end_episodes(batch, rows$episode[ended], playing$rows$return[ended], length,
@@ -195,7 +190,14 @@ begin_next_episodes <- function(batch, playing, ended, waiting) {
     return(invisible())
   }
   if (any(waiting)) {
-    playing$observation <- begin_waiting(batch, playing, which(waiting))
+    # The first observations of new episodes that the environment does not start itself.
+    begun <- begin_episodes(batch, rows$episode[waiting], playing$last)
+    playing$observation <- if (all(waiting)) {
+      begun
+    } else {
+      replace_rows(vector_env$observation_space, playing$observation, length(waiting),
+                   which(waiting), begun)
+    }
   }
   begun <- which(rows$began == playing$taken)
   begin_memory(batch$policy, rows$sub_env[begun])
@@ -204,19 +206,6 @@ begin_next_episodes <- function(batch, playing, ended, waiting) {
   if (!identical(candidate, playing$candidate)) {
     playing$candidate <- candidate
     playing$acting <- policy_rows(batch$policy, candidate, rows$sub_env)
-  }
-}
-
-# Replaces the last observations by the first ones of new episodes that the environment does not
-# start itself.
-begin_waiting <- function(batch, playing, waiting) {
-  episode <- playing$rows$episode
-  begun <- begin_episodes(batch, episode[waiting], playing$last)
-  n <- length(episode)
-  if (length(waiting) == n) {
-    begun
-  } else {
-    replace_rows(batch$vector_env$observation_space, playing$observation, n, waiting, begun)
   }
 }
 
@@ -289,23 +278,12 @@ end_episodes <- function(batch, at, returns, length, out) {
 # the target. An earlier candidate with missing returns is played to its end, because it may reach
 # the target, too.
 needed_episodes <- function(returns, each, target) {
-  if (length(returns) < each) {
-    return(length(returns))
-  }
-  reached <- which(colMeans(matrix(returns, each)) >= target)
-  min(reached[1L] * each, length(returns), na.rm = TRUE)
+  n <- length(returns)
+  reached <- if (n >= each) which(colMeans(matrix(returns, each)) >= target)
+  min(reached[1L] * each, n, na.rm = TRUE)
 }
 
 # Moments of observations ------------------------------------------------------------------
-
-# Collects the observations before a step. R takes as long to add a few rows to the moments as
-# hundreds, so several steps are added together. How many depends only on an observation's size.
-note_observations <- function(batch, playing) {
-  values <- number_rows(playing$observation)
-  batch$noted[[length(batch$noted) + 1L]] <- values
-  together <- max(1L, min(64L, 8192L %/% ncol(values)))
-  if (playing$taken %% together == 0L) add_noted(batch)
-}
 
 add_noted <- function(batch) {
   if (length(batch$noted)) {

@@ -72,11 +72,9 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
 # If no episode ever ends, playing would never return.
 check_has_end <- function(vector_env, max_steps) {
   if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
-    gym_abort(
-      c(paste0("Episodes of ", environment_label(vector_env), " never end."),
-        i = "Give `max_steps`, after which an episode is cut off."),
-      class = "gym_error_argument", argument = "max_steps", call = vector_env$call
-    )
+    abort_misuse("max_steps", NULL, vector_env$call,
+                 "Episodes of {environment_label(vector_env)} never end.",
+                 i = "Give `max_steps`, after which an episode is cut off.")
   }
 }
 
@@ -135,10 +133,6 @@ episode_results <- function(history) {
   })
 }
 
-# Whether candidates can play the same episodes. They cannot if R steps sub-environments that share
-# a seed.
-has_common_seeds <- function(vector_env) !vector_env$one_seed || !is.null(vector_env$description)
-
 # The environment that plays --------------------------------------------------------------
 
 #' Call a function with the vector environment of an environment
@@ -172,12 +166,19 @@ with_vector_env <- function(env, episodes, play, max_steps = NULL, ..., client =
         "as_vector_env", call
       )
       made <<- complete(vector_env)
-      inform_of_memory(made, env)
-      if (calls_r(env) && is_made_by_server(env)) inform_calls_r(made)
+      inform_of_play(made, env)
     }
     made
   }
-  vector_env <- describe_to_play(env, arguments, client, call)
+  # Arguments about sub-environments are not arguments of the environment.
+  of_sub_envs <- rlang::names2(arguments) %in% c("num_envs", "num_workers", "frames")
+  given <- arguments[of_sub_envs]
+  check_count(given$num_envs, allow_null = TRUE, arg = "num_envs", call = call)
+  check_count(given$num_workers, min = 0, allow_null = TRUE, arg = "num_workers", call = call)
+  vector_env <- describe_env(
+    env, arguments[!of_sub_envs], client, given$num_envs, isTRUE(given$frames), call = call
+  )
+  if (isTRUE(vector_env$one_seed)) check_no_workers(given$num_workers, call)
   if (is.null(vector_env)) {
     vector_env <- make()
   } else {
@@ -188,19 +189,6 @@ with_vector_env <- function(env, episodes, play, max_steps = NULL, ..., client =
   value <- play(vector_env)
   finished <- TRUE
   value
-}
-
-# Arguments about sub-environments are not arguments of the environment.
-describe_to_play <- function(env, arguments, client, call) {
-  of_sub_envs <- rlang::names2(arguments) %in% c("num_envs", "num_workers", "frames")
-  given <- arguments[of_sub_envs]
-  check_count(given$num_envs, allow_null = TRUE, arg = "num_envs", call = call)
-  check_count(given$num_workers, min = 0, allow_null = TRUE, arg = "num_workers", call = call)
-  described <- describe_env(
-    env, arguments[!of_sub_envs], client, given$num_envs, isTRUE(given$frames), call = call
-  )
-  if (isTRUE(described$one_seed)) check_no_workers(given$num_workers, call)
-  described
 }
 
 # `max_steps` cannot extend the environment's own limit.
@@ -219,8 +207,8 @@ warn_of_own_limit <- function(max_steps, vector_env, call) {
   }
 }
 
-# Only if it was decided here to play one episode after the other.
-inform_of_memory <- function(vector_env, env) {
+# Why R plays one episode after the other, or step by step, if it was decided here.
+inform_of_play <- function(vector_env, env) {
   if (length(vector_env$remembers) && is_given_by_id(env)) {
     rlang::inform(
       c(i = paste0(paste(vector_env$remembers, collapse = " and "), " remembers earlier episodes, ",
@@ -228,13 +216,80 @@ inform_of_memory <- function(vector_env, env) {
       class = "gym_message_remembers"
     )
   }
+  if (calls_r(env) && is_made_by_server(env)) {
+    names <- intersect(names(transforms), vector_env$spec$wrappers)
+    rlang::inform(
+      c(i = paste0(paste(names, collapse = " and "), " calls an R function in each step, so R ",
+                   "plays step by step, which takes longer than playing on the server.")),
+      class = "gym_message_calls_r", .frequency = "once", .frequency_id = "gym_calls_r"
+    )
+  }
 }
 
-inform_calls_r <- function(vector_env) {
-  names <- intersect(names(transforms), vector_env$spec$wrappers)
-  rlang::inform(
-    c(i = paste0(paste(names, collapse = " and "), " calls an R function in each step, so R plays ",
-                 "step by step, which takes longer than playing on the server.")),
-    class = "gym_message_calls_r", .frequency = "once", .frequency_id = "gym_calls_r"
+# Progress, interrupts, and the results of what ended early ---------------------------------
+
+#' Play until the end or an interrupt
+#'
+#' @param play Code that plays.
+#' @param text A message for an interrupt, for cli, with `{finished}` and, if given, `{total}`.
+#' @param count_finished A function that returns the number of finished ones, or a text.
+#' @return Whether there was an interrupt, logical.
+#' @noRd
+until_interrupted <- function(play, text, count_finished, total = NULL) {
+  interrupted <- FALSE
+  tryCatch(play, interrupt = function(cnd) {
+    interrupted <<- TRUE
+    finished <- count_finished()
+    cli::cli_inform(c("!" = text), class = "gym_message_interrupted")
+  })
+  interrupted
+}
+
+#' Show a progress bar until the calling function ends
+#'
+#' If the package progressr is loaded, its handlers are informed, too.
+#' @param unit The unit, a word such as `"Round"`.
+#' @param note The text before the remaining time.
+#' @param shown Whether to show the bar.
+#' @return A function of the number of finished units and the new `note`.
+#' @noRd
+progress_bar <- function(total, unit, note = "", shown = TRUE, frame = parent.frame()) {
+  bar <- if (shown) {
+    cli::cli_progress_bar(
+      total = total, extra = list(note = note), .envir = frame,
+      format = paste(unit, "{cli::pb_current} of {cli::pb_total} {cli::pb_bar}",
+                     "{cli::pb_extra$note}{cli::pb_eta_str}")
+    )
+  }
+  signals <- "progressr" %in% loadedNamespaces()
+  progress <- if (signals) progressr::progressor(steps = total, envir = frame)
+  updated <- signalled <- 0
+  function(finished, note = "") {
+    # A finished bar no longer exists.
+    if (shown && updated < total) {
+      updated <<- finished
+      cli::cli_progress_update(set = finished, extra = list(note = note), id = bar, .envir = frame)
+    }
+    # At most a hundred signals, because each takes a while.
+    amount <- finished - signalled
+    if (signals && (amount >= total / 100 || finished >= total && amount > 0)) {
+      progress(note, amount = amount)
+      signalled <<- finished
+    }
+  }
+}
+
+# The error keeps the classes and fields of the original one: code that expects a lost connection
+# need not know that it was lost during play.
+abort_with_result <- function(cnd, what, result, played, class, call, hint = NULL) {
+  own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
+           "use_cli_format")
+  fields <- unclass(cnd)[setdiff(names(cnd), own)]
+  rlang::exec(
+    gym_abort,
+    c(paste0(what, " ended early, after ", played, "."),
+      i = "The field `result` of this condition has the finished part.", i = hint),
+    class = c(class, grep("^gym_error_", class(cnd), value = TRUE)), result = result, !!!fields,
+    parent = cnd, call = call
   )
 }

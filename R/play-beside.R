@@ -225,8 +225,7 @@ play_listed_episodes <- function(vector_env, task) {
   candidates <- unique(task$episodes$candidate)
   policy_of <- function(these) policy_subset(task$policy, match(these, candidates))
   play <- new_play(
-    vector_env, task$episodes, policy_of, task$max_steps,
-    task$keep, most = task$most,
+    vector_env, task$episodes, policy_of, task$max_steps, task$keep, most = task$most,
     enter = function(batch) batches[[length(batches) + 1L]] <<- batch
   )
   vector_env$call <- quote(rollout())

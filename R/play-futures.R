@@ -36,9 +36,7 @@ do_tasks <- function(next_task, deadline, call) {
       do_here(crew)
     }
     ready <- await_workers(crew)
-    for (number in rev(seq_along(crew$running))) {
-      look_at(crew, number, number %in% ready)
-    }
+    for (number in rev(seq_along(crew$running))) look_at(crew, number, number %in% ready)
   }
 }
 
@@ -86,24 +84,28 @@ await_workers <- function(crew) {
     return(integer())
   }
   ready <- select_workers(crew$running)
-  if (is.null(ready)) Sys.sleep(pause_seconds(crew))
+  if (is.null(ready)) {
+    # A hundredth of the time since the last task was sent.
+    waited <- proc.time()[["elapsed"]] - max(vapply(crew$running, function(one) one$started, 0))
+    has_deadline <- is.finite(crew$deadline(crew$slowest))
+    longest <- if (has_deadline) longest_wait else longest_wait_without_deadline
+    Sys.sleep(min(longest, max(0.002, waited / 100)))
+  }
   if (any(ready)) which(ready) else seq_along(crew$running)
 }
 
 # `NULL` if a worker's connection is unknown.
 select_workers <- function(running) {
-  connections <- lapply(running, function(one) worker_connection(one$future))
+  # The sockets by which the workers answer, if they are known.
+  connections <- lapply(running, function(one) {
+    connection <- worker_node(one$future)$con
+    is_open <- inherits(connection, "sockconn") &&
+      tryCatch(isOpen(connection), error = function(cnd) FALSE)
+    if (is_open) connection
+  })
   if (!any(vapply(connections, is.null, NA))) {
     tryCatch(socketSelect(connections, FALSE, longest_wait), error = function(cnd) NULL)
   }
-}
-
-# If the connections are unknown: a hundredth of the time since the last task was sent.
-pause_seconds <- function(crew) {
-  waited <- proc.time()[["elapsed"]] - max(vapply(crew$running, function(one) one$started, 0))
-  has_deadline <- is.finite(crew$deadline(crew$slowest))
-  longest <- if (has_deadline) longest_wait else longest_wait_without_deadline
-  min(longest, max(0.002, waited / 100))
 }
 
 # Since future 1.40 the workers belong to the future's backend.
@@ -111,14 +113,6 @@ worker_node <- function(future) {
   workers <- future$backend$workers %||% future$workers
   if (is.list(workers) && !is.null(future$node)) workers[[future$node]]
 }
-
-# The socket by which a future's worker answers, if it is known.
-worker_connection <- function(future) {
-  connection <- worker_node(future)$con
-  if (inherits(connection, "sockconn") && is_open(connection)) connection
-}
-
-is_open <- function(connection) tryCatch(isOpen(connection), error = function(cnd) FALSE)
 
 # Futures of an interrupted call keep their workers busy until somebody takes their values. Those
 # cancelled with their plan are not taken: future would start workers for them.
@@ -200,9 +194,7 @@ do_here <- function(crew) {
     inform_plays_here("none of them is free, or alive")
   }
   one <- take_task(crew)
-  if (!is.null(one)) {
-    one$done(one$here())
-  }
+  if (!is.null(one)) one$done(one$here())
 }
 
 # Checks a task that may be `ready`. It is lost if it is not ready for too long.

@@ -152,8 +152,7 @@ read_steps <- function(play, lengths, answer) {
   observed <- vector_env$observation_space
   tensors <- answer$tensors
   list(
-    at = rep(seq_along(lengths), lengths),
-    observation = read(observed, "observation"),
+    at = rep(seq_along(lengths), lengths), observation = read(observed, "observation"),
     action = read(vector_env$action_space, "action"),
     reward = tensor_of(tensors, "step/reward", n, is.double),
     terminated = tensor_of(tensors, "step/terminated", n, is.logical),

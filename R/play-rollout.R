@@ -145,7 +145,15 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_count(episodes)
   check_count(max_steps, allow_null = TRUE)
   check_seed(seed)
-  check_steps_wanted(steps, next_observation)
+  if (identical(steps, "arrays")) {
+    abort_defunct("`steps = TRUE` keeps the steps in a table", "`steps = \"arrays\"`")
+  }
+  check_flag(steps)
+  check_flag(next_observation)
+  if (next_observation && !steps) {
+    abort_misuse("next_observation", TRUE, rlang::current_env(),
+                 "`next_observation = TRUE` needs the steps to be kept.", i = "Add `steps = TRUE`.")
+  }
   check_flag(frames)
   check_count(num_envs, allow_null = TRUE)
   check_count(num_workers, min = 0, allow_null = TRUE)
@@ -159,10 +167,36 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
     abort_argument(episodes, must, "episodes", rlang::current_env())
   }
   seed <- seed %||% draw_seed()
+  limit <- max_steps %||% Inf
   play <- function(vector_env) {
-    play_rollout(
-      vector_env, policy, candidates, episodes, max_steps, seed, steps, next_observation, progress
+    policy <- policy_bind(policy, vector_env, call = vector_env$call)
+    vector_env <- env_for_policy(vector_env, policy, limit, steps)
+    history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
+    origin <- new_provenance(vector_env, list(seed = seed), started = NULL)
+    result <- function(interrupted = FALSE) {
+      new_rollout(history, policy, vector_env, origin, steps, next_observation, interrupted)
+    }
+    total <- candidates * episodes
+    show <- progress_bar(total, "Episode", shown = progress)
+    interrupted <- tryCatch(
+      until_interrupted(
+        play_batches(
+          vector_env, history, function(candidates) policy_subset(policy, candidates),
+          report = function(ended) show(history$played_episodes + ended),
+          max_steps = limit, keep_steps = steps, keep_next = next_observation
+        ),
+        "Interrupted after {finished} of {total} episode{?s}; the finished ones are returned.",
+        function() history$played_episodes, total
+      ),
+      error = function(cnd) {
+        if (!history$played_episodes) rlang::cnd_signal(cnd)
+        played <- count_of(history$played_episodes, "episode")
+        abort_with_result(
+          cnd, "The rollout", result(), played, "gym_error_rollout", vector_env$call
+        )
+      }
     )
+    result(interrupted)
   }
   with_vector_env(
     env = env, episodes = candidates * episodes, play = play, max_steps = max_steps,
@@ -171,59 +205,10 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   )
 }
 
-check_steps_wanted <- function(steps, next_observation, call = rlang::caller_env()) {
-  if (identical(steps, "arrays")) {
-    abort_defunct("`steps = TRUE` keeps the steps in a table", "`steps = \"arrays\"`", call)
-  }
-  check_flag(steps, call = call)
-  check_flag(next_observation, call = call)
-  if (next_observation && !steps) {
-    gym_abort(
-      c("`next_observation = TRUE` needs the steps to be kept.",
-        i = "Add `steps = TRUE`."),
-      class = "gym_error_argument", argument = "next_observation", value = TRUE, call = call
-    )
-  }
-}
-
-play_rollout <- function(vector_env, policy, candidates, episodes, max_steps, seed, steps,
-                         next_observation, progress) {
-  policy <- policy_bind(policy, vector_env, call = vector_env$call)
-  vector_env <- env_for_policy(vector_env, policy, max_steps %||% Inf, steps)
-  history <- new_history(candidates, episodes, new_streams(seed), common_seeds = TRUE)
-  origin <- new_provenance(vector_env, list(seed = seed), started = NULL)
-  result <- function(interrupted = FALSE) {
-    new_rollout(history, policy, vector_env, origin, steps, next_observation, interrupted)
-  }
-  total <- candidates * episodes
-  show <- progress_bar(total, "Episode", shown = progress)
-  interrupted <- tryCatch(
-    until_interrupted(
-      play_batches(
-        vector_env, history, function(candidates) policy_subset(policy, candidates),
-        report = function(ended) show(history$played_episodes + ended),
-        max_steps = max_steps %||% Inf, keep_steps = steps, keep_next = next_observation
-      ),
-      "Interrupted after {finished} of {total} episode{?s}; the finished ones are returned.",
-      function() history$played_episodes, total
-    ),
-    error = function(cnd) {
-      if (!history$played_episodes) {
-        rlang::cnd_signal(cnd)
-      }
-      played <- count_of(history$played_episodes, "episode")
-      abort_with_result(
-        cnd, "The rollout", result(), played, "gym_error_rollout", vector_env$call
-      )
-    }
-  )
-  result(interrupted)
-}
-
 new_rollout <- function(history, policy, vector_env, origin, steps, next_observation, interrupted) {
   several <- !is.null(count_candidates(policy))
   episodes <- episodes_table(history$batches, several)
-  fps <- vector_env$spec$render_fps
+  frames <- unlist(lapply(history$batches, `[[`, "frames"), recursive = FALSE)
   structure(
     list(
       episodes = episodes,
@@ -231,15 +216,11 @@ new_rollout <- function(history, policy, vector_env, origin, steps, next_observa
         steps_table(history$batches, episodes, vector_env, several, next_observation)
       },
       frames = if (!is.null(vector_env$frame)) {
-        lapply(unlist(lapply(history$batches, function(batch) batch$frames), recursive = FALSE),
-               new_frames, fps = fps)
+        lapply(frames, new_frames, fps = vector_env$spec$render_fps)
       },
-      policy = policy,
-      env_id = environment_label(vector_env),
-      num_envs = if (vector_env$one_seed) vector_env$num_envs,
-      seed = origin$seed,
-      interrupted = interrupted,
-      provenance = origin
+      policy = policy, env_id = environment_label(vector_env),
+      num_envs = if (vector_env$one_seed) vector_env$num_envs, seed = origin$seed,
+      interrupted = interrupted, provenance = origin
     ),
     class = "gym_rollout"
   )
@@ -263,32 +244,18 @@ predict.gym_rollout <- function(object, newdata, type = c("action", "output"), .
 
 #' @export
 print.gym_rollout <- function(x, ...) {
-  cat(rollout_lines(x), sep = "\n")
+  returns <- x$episodes$return
+  cat(played_lines(x, length(returns), sum(x$episodes$length)), sep = "\n")
   if (!is.null(x$episodes$candidate)) {
     print_candidates(evaluate_episodes(x$episodes, x$policy))
+  } else if (length(returns) < 2L) {
+    cat("Return: ", if (length(returns)) number_text(returns) else "none", "\n", sep = "")
+  } else {
+    cat("Return: mean ", number_text(mean(returns)), se_text(standard_error(returns)),
+        ", median ", number_text(stats::median(returns)), ", from ", number_text(min(returns)),
+        " to ", number_text(max(returns)), "\n", sep = "")
   }
   invisible(x)
-}
-
-rollout_lines <- function(x) {
-  returns <- x$episodes$return
-  c(
-    paste0("Rollout in ", env_text(x), ": ",
-           count_of(length(returns), "episode"), ", ", count_of(sum(x$episodes$length), "step")),
-    paste0("Policy: ", policy_text(x$policy)),
-    if (is.null(x$episodes$candidate)) paste0("Return: ", returns_text(returns))
-  )
-}
-
-returns_text <- function(returns) {
-  if (length(returns) < 2L) {
-    return(if (length(returns)) number_text(returns) else "none")
-  }
-  paste0(
-    "mean ", number_text(mean(returns)), se_text(standard_error(returns)),
-    ", median ", number_text(stats::median(returns)),
-    ", from ", number_text(min(returns)), " to ", number_text(max(returns))
-  )
 }
 
 #' Summarise a rollout
@@ -309,17 +276,11 @@ summary.gym_rollout <- function(object, ...) {
   episodes <- object$episodes
   structure(
     list(
-      env_id = object$env_id,
-      wrappers = object$provenance$wrappers,
-      policy = object$policy,
-      episodes = nrow(episodes),
-      steps = sum(episodes$length),
-      returns = quartiles(episodes$return),
-      lengths = quartiles(episodes$length),
-      mean = mean(episodes$return),
-      se = standard_error(episodes$return),
-      terminated = sum(episodes$terminated),
-      truncated = sum(episodes$truncated),
+      env_id = object$env_id, wrappers = object$provenance$wrappers, policy = object$policy,
+      episodes = nrow(episodes), steps = sum(episodes$length),
+      returns = quartiles(episodes$return), lengths = quartiles(episodes$length),
+      mean = mean(episodes$return), se = standard_error(episodes$return),
+      terminated = sum(episodes$terminated), truncated = sum(episodes$truncated),
       candidates = if (!is.null(episodes$candidate)) evaluate_episodes(episodes, object$policy)
     ),
     class = "summary.gym_rollout"
@@ -329,20 +290,23 @@ summary.gym_rollout <- function(object, ...) {
 #' @export
 print.summary.gym_rollout <- function(x, ...) {
   cat(
-    paste0("Rollout in ", env_text(x), ": ",
-           count_of(x$episodes, "episode"), ", ", count_of(x$steps, "step")),
-    paste0("Policy: ", policy_text(x$policy)),
+    played_lines(x, x$episodes, x$steps),
     if (is.null(x$candidates)) paste0("Mean return: ", number_text(x$mean), se_text(x$se)),
-    paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated),
-    "",
-    sep = "\n"
+    paste0("Terminated: ", x$terminated, ", truncated: ", x$truncated), "", sep = "\n"
   )
-  if (!is.null(x$candidates)) {
+  if (is.null(x$candidates)) {
+    print(signif(rbind(return = x$returns, length = x$lengths), 4L))
+  } else {
     print_candidates(x$candidates)
-    return(invisible(x))
   }
-  print(signif(rbind(return = x$returns, length = x$lengths), 4L))
   invisible(x)
+}
+
+# What was played, and by which policy.
+played_lines <- function(x, episodes, steps, what = "Rollout") {
+  c(paste0(what, " in ", env_text(x), ": ", count_of(episodes, "episode"), ", ",
+           count_of(steps, "step")),
+    paste0("Policy: ", policy_text(x$policy)))
 }
 
 quartiles <- function(x) {

@@ -8,14 +8,10 @@ episodes_table <- function(batches, several = FALSE) {
     c(type, unlist(lapply(batches, function(batch) batch[[name]])))
   }
   episodes <- data.frame(
-    candidate = column("candidate", integer()),
-    episode = column("episode", integer()),
-    seed = column("seed", integer()),
-    sub_env = column("sub_env", integer()),
-    return = column("return", numeric()),
-    length = column("length", integer()),
-    terminated = column("terminated", logical()),
-    truncated = column("truncated", logical())
+    candidate = column("candidate", integer()), episode = column("episode", integer()),
+    seed = column("seed", integer()), sub_env = column("sub_env", integer()),
+    return = column("return", numeric()), length = column("length", integer()),
+    terminated = column("terminated", logical()), truncated = column("truncated", logical())
   )
   if (several) episodes else episodes[-1L]
 }
@@ -51,7 +47,11 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
 steps_in_order <- function(batches, episodes, vector_env, next_observation = FALSE) {
   steps <- unlist(lapply(batches, `[[`, "steps"), recursive = FALSE)
   each <- function(name) lapply(steps, `[[`, name)
-  row <- step_rows(batches)
+  # The row of its episode in the table of episodes, for each step in the order of play.
+  before <- c(0L, cumsum(vapply(batches, function(batch) length(batch$episode), 0L)))
+  row <- unlist(lapply(seq_along(batches), function(i) {
+    before[[i]] + unlist(lapply(batches[[i]]$steps, `[[`, "at"))
+  }))
   # Step by step, episodes were played in parallel. Stable sorting keeps the steps of each in order.
   mixed <- is.unsorted(row)
   order <- if (mixed) order(row, method = "radix") else seq_along(row)
@@ -70,14 +70,6 @@ steps_in_order <- function(batches, episodes, vector_env, next_observation = FAL
     terminated = unlist(each("terminated"))[order], truncated = truncated,
     next_observation = if (next_observation) bind("next_observation", observed)
   )
-}
-
-# The row of its episode in the table of episodes, for each step in the order of play.
-step_rows <- function(batches) {
-  before <- c(0L, cumsum(vapply(batches, function(batch) length(batch$episode), 0L)))
-  unlist(lapply(seq_along(batches), function(i) {
-    before[[i]] + unlist(lapply(batches[[i]]$steps, function(step) step$at))
-  }))
 }
 
 #' Put steps in order, episode after episode
@@ -99,13 +91,73 @@ steps_by_episode <- function(x, arg, call) {
     check_column(x, "step", "whole numbers", are_whole_numbers, arg, call)
     again <- which(duplicated(data.frame(x[["episode"]], step)))
     if (length(again)) {
-      gym_abort(
-        c(paste0("Row ", again[[1L]], " of `", arg, "` is another step ", step[[again[[1L]]]],
-                 " of the same episode."),
-          i = "Number the episodes in a column `episode`."),
-        class = "gym_error_argument", argument = arg, value = x, call = call
-      )
+      abort_misuse(arg, x, call,
+                   "Row {again[[1L]]} of `{arg}` is another step {step[[again[[1L]]]]} of the same
+                    episode.",
+                   i = "Number the episodes in a column `episode`.")
     }
   }
   x[order(x[["episode"]], step %||% seq_along(episode)), ]
+}
+
+# How a result was made: what you need to get it again, or to see why another one differs.
+
+new_provenance <- function(vector_env, settings, started = Sys.time()) {
+  system <- Sys.info()
+  # NumPy calculates what policies do that play on the server.
+  # The versions of the server and of what simulates the environment, such as MuJoCo: episodes may
+  # differ from one version to another.
+  versions <- c(server_versions(vector_env$client), vector_env$spec$engine) %||%
+    vector_env$model$versions
+  described <- vector_env$description$versions
+  way <- if (!is.null(vector_env$model)) {
+    "from the model in R"
+  } else if (is.null(vector_env$description)) {
+    "step by step"
+  } else {
+    "beside the environment"
+  }
+  structure(
+    list(
+      gym = as.character(utils::packageVersion("gym")), R = as.character(getRversion()),
+      platform = R.version$platform, system = paste(system[["sysname"]], system[["release"]]),
+      BLAS = extSoftVersion()[["BLAS"]], LAPACK = La_library(),
+      server = c(versions, described[setdiff(names(described), names(versions))]),
+      processor = vector_env$description$processor, way = way,
+      env_id = environment_label(vector_env),
+      kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
+      wrappers = as.character(vector_env$spec$wrappers),
+      num_envs = if (is.null(vector_env$description)) vector_env$num_envs,
+      seed = settings$seed, preset = settings$agent$preset, started = started, elapsed = NA_real_
+    ),
+    class = "gym_provenance"
+  )
+}
+
+#' @export
+format.gym_provenance <- function(x, ...) {
+  text <- function(x) if (is.character(x) && length(x) == 1L) x else describe_value(x)
+  named <- function(values) {
+    if (length(values)) paste(names(values), vapply(values, text, ""), collapse = ", ")
+  }
+  lines <- c(
+    gym = x$gym, R = x$R, platform = x$platform, system = x$system, BLAS = x$BLAS,
+    LAPACK = x$LAPACK, server = named(x$server), processor = x$processor, played = x$way,
+    environment = x$env_id, arguments = named(x$kwargs),
+    wrappers = if (length(x$wrappers)) toString(x$wrappers),
+    `sub-environments` = if (length(x$num_envs)) as.character(x$num_envs),
+    seed = if (length(x$seed)) toString(format(x$seed, scientific = FALSE, trim = TRUE)),
+    preset = x$preset$origin,
+    started = if (!is.null(x$started) && prints_times()) {
+      format(x$started, "%Y-%m-%d %H:%M:%S %Z")
+    },
+    elapsed = if (!is.na(x$elapsed)) elapsed_text(x$elapsed, "")
+  )
+  paste(format(paste0(names(lines), ":")), lines)
+}
+
+#' @export
+print.gym_provenance <- function(x, ...) {
+  writeLines(format(x))
+  invisible(x)
 }

@@ -59,11 +59,24 @@ do_task <- function(task) {
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
       the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
-      take_session_objects(task$session)
+      # Where the task's functions look for objects of the session.
+      for (package in task$session$packages) {
+        suppressPackageStartupMessages(library(package, character.only = TRUE))
+      }
+      list2env(task$session$objects, globalenv())
       # As many processes play beside the environment as future gives the worker cores: normally
       # one.
       the_session$cores <- parallelly::availableCores()[[1L]]
-      with_own_server(list(value = run_task(task)))
+      # A forked child has its own server, too, which must not outlive it.
+      if (Sys.getpid() != the_session$pid) {
+        parent <- mget(c("pid", "client", "servers"), the_session)
+        list2env(list(pid = Sys.getpid(), client = NULL, servers = list()), the_session)
+        on.exit({
+          lapply(the_session$servers, stop_server)
+          list2env(parent, the_session)
+        })
+      }
+      list(value = run_task(task))
     },
     error = function(cnd) {
       forget_kept()
@@ -96,21 +109,6 @@ check_worker_gymnasium <- function(task, client) {
   }
 }
 
-# A forked child has its own server, too, which must not outlive it.
-with_own_server <- function(code) {
-  if (Sys.getpid() != the_session$pid) {
-    parent <- mget(c("pid", "client", "servers"), the_session)
-    the_session$pid <- Sys.getpid()
-    the_session$client <- NULL
-    the_session$servers <- list()
-    on.exit({
-      lapply(the_session$servers, stop_server)
-      list2env(parent, the_session)
-    })
-  }
-  code
-}
-
 # Does a task by its class. The worker has the right package.
 run_task <- function(task) UseMethod("run_task")
 
@@ -129,34 +127,25 @@ kept_vector_env <- function(task) {
     return(kept)
   }
   if (length(the_worker$kept) >= most_kept) forget_kept()
-  made <- make_from_recipe(recipe, task$num_envs)
+  make <- function(...) rlang::exec(as_vector_env, recipe$env, ..., !!!recipe$arguments)
+  num_envs <- task$num_envs
+  made <- if (inherits(recipe$env, "gym_model") || is_registered(recipe$env)) {
+    make(num_envs = num_envs)
+  } else if (num_envs == 1L) {
+    make(max_envs = 1L)
+  } else {
+    make(num_envs = num_envs, num_workers = recipe$num_workers %||% if (!recipe$one_seed) 0L)
+  }
   check_worker_gymnasium(task, made$client)
   made$call <- quote(play_batch())
   the_worker$kept[[key]] <- made
   made
 }
 
-make_from_recipe <- function(recipe, num_envs) {
-  if (inherits(recipe$env, "gym_model")) {
-    return(as_vector_env(recipe$env, num_envs))
-  }
-  make <- function(...) rlang::exec(as_vector_env, recipe$env, ..., !!!recipe$arguments)
-  if (is_registered(recipe$env)) {
-    return(make(num_envs = num_envs))
-  }
-  if (num_envs > 1L) {
-    make(num_envs = num_envs, num_workers = recipe$num_workers %||% if (!recipe$one_seed) 0L)
-  } else {
-    make(max_envs = 1L)
-  }
-}
-
 forget_kept <- function() {
   kept <- the_worker$kept
   the_worker$kept <- list()
-  for (vector_env in kept) {
-    try(vector_env$close(wait = FALSE), silent = TRUE)
-  }
+  for (vector_env in kept) try(vector_env$close(wait = FALSE), silent = TRUE)
 }
 
 # Objects of the session ------------------------------------------------------------------
@@ -199,28 +188,17 @@ session_functions <- function(x, seen = rlang::env(list = list())) {
       list(x)
     }
   } else if (is.environment(x)) {
-    functions_of_environment(x, seen)
+    passed <- c(list(globalenv(), baseenv(), emptyenv()), seen$list)
+    if (isNamespace(x) || any(vapply(passed, identical, NA, x))) {
+      return(NULL)
+    }
+    seen$list <- c(seen$list, x)
+    # A class of R6 names the one that it inherits from in an expression.
+    parent <- if (inherits(x, "R6ClassGenerator")) as.function(list(x$inherit), x$parent_env)
+    inside <- c(list(parent, parent.env(x)), as.list.environment(x, all.names = TRUE))
+    session_functions(inside, seen)
   } else if (is.list(x)) {
     x <- Filter(function(part) !rlang::is_missing(part), unclass(x))
     unlist(lapply(x, session_functions, seen), recursive = FALSE, use.names = FALSE)
   }
-}
-
-functions_of_environment <- function(x, seen) {
-  shared <- list(globalenv(), baseenv(), emptyenv())
-  if (isNamespace(x) || any(vapply(c(shared, seen$list), identical, NA, x))) {
-    return(NULL)
-  }
-  seen$list <- c(seen$list, x)
-  # A class of R6 names the one that it inherits from in an expression.
-  parent <- if (inherits(x, "R6ClassGenerator")) as.function(list(x$inherit), x$parent_env)
-  session_functions(c(list(parent, parent.env(x)), as.list.environment(x, all.names = TRUE)), seen)
-}
-
-# On the worker: where its functions look for them.
-take_session_objects <- function(found) {
-  for (package in found$packages) {
-    suppressPackageStartupMessages(library(package, character.only = TRUE))
-  }
-  list2env(found$objects, globalenv())
 }

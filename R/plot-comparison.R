@@ -8,9 +8,7 @@ comparison_picture <- function(rollouts) {
   data <- comparison_plot_data(rollouts)
   returns <- data$returns
   one_env <- nlevels(returns$env_id) == 1L
-  ggplot2::ggplot(
-    returns, ggplot2::aes(.data$value, fill = .data$label, colour = .data$label)
-  ) +
+  ggplot2::ggplot(returns, ggplot2::aes(.data$value, fill = .data$label, colour = .data$label)) +
     # All rows have the same height.
     ggplot2::geom_density(
       ggplot2::aes(y = ggplot2::after_stat(.data$scaled)), returns[returns$kind == "density", ],
@@ -54,10 +52,15 @@ comparison_picture <- function(rollouts) {
     )
 }
 
+row_titles <- function(rows) {
+  stats::setNames(paste0(rows$label, ", median ", number_text_each(rows$median)), rows$label)
+}
+
 # Bars of one environment.
 bars_of_rows <- function(returns) {
   few <- returns[returns$kind == "bars", ]
   whole <- returns[returns$kind == "histogram", ]
+  of_highest <- function(count, row) count / stats::ave(count, droplevels(row), FUN = max)
   height <- ggplot2::aes(y = ggplot2::after_stat(of_highest(.data$count, .data$PANEL)))
   list(
     ggplot2::geom_bar(
@@ -73,11 +76,6 @@ bars_of_rows <- function(returns) {
     }
   )
 }
-of_highest <- function(count, row) count / stats::ave(count, droplevels(row), FUN = max)
-
-row_titles <- function(rows) {
-  stats::setNames(paste0(rows$label, ", median ", number_text_each(rows$median)), rows$label)
-}
 
 #' Compute the data of a plot of several policies
 #' @param rollouts A list of rollouts with names.
@@ -89,7 +87,10 @@ comparison_plot_data <- function(rollouts) {
   each <- Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)
   ids <- rep(vapply(rollouts, function(x) x$env_id, ""), lengths(each))
   groups <- unlist(unname(each), recursive = FALSE)
-  by_env <- lapply(split(groups, factor(ids, unique(ids))), shown_groups)
+  by_env <- lapply(split(groups, factor(ids, unique(ids))), function(groups) {
+    highest <- order(-vapply(groups, mean, 0))[seq_len(most_rows)]
+    if (length(groups) <= most_rows) groups else groups[highest]
+  })
   shown <- unlist(unname(by_env), recursive = FALSE)
   # In the order of the rows, which is that of the colours.
   label <- factor(names(shown), unique(names(shown)))
@@ -131,14 +132,6 @@ candidate_returns <- function(x, label, several) {
   each <- split(x$episodes$return, candidate)
   names <- candidate_names(x$policy)[as.integer(names(each))] %||% names(each)
   stats::setNames(each, if (several) paste(label, names) else names)
-}
-
-# All groups, or of many those with the highest mean returns.
-shown_groups <- function(groups) {
-  if (length(groups) <= most_rows) {
-    return(groups)
-  }
-  groups[order(-vapply(groups, mean, 0))[seq_len(most_rows)]]
 }
 
 # Evaluations --------------------------------------------------------------------------
@@ -191,6 +184,197 @@ autoplot.gym_evaluation <- function(object, ...) {
         episodes_each(rows$episodes)
       ),
       x = "mean return", y = NULL
+    ) +
+    theme_gym()
+}
+
+#' Plot a comparison of trainings
+#'
+#' Show a comparison. For scores: the mean, median and interquartile mean of each training with
+#' their intervals (`type = "scores"`, the default), the performance profiles (`"profile"`), or the
+#' probabilities that one training scores higher than another (`"improvement"`). For steps to a
+#' target: the share of runs that have reached it, over the steps of the training, with its
+#' interval. Ticks are the ends of runs that failed or were interrupted.
+#'
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object A comparison, as returned by [compare_trainings()].
+#' @param type What to show of scores, a string.
+#' @param main The title. `NULL`, the default, names the environments.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @section Errors: `gym_error_argument` for another `type`.
+#' @rdname plot.gym_comparison
+#' @exportS3Method ggplot2::autoplot
+#' @examplesIf gym:::can_start_server()
+#' trained <- lapply(list(ARS = agent_ars(), random = agent_random()), train_agent, "CartPole-v1",
+#'                   total_steps = 2000, target = Inf, seeds = 1:5, eval_episodes = 10)
+#' compared <- do.call(compare_trainings, trained)
+#' plot(compared)
+#' plot(compared, type = "improvement")
+autoplot.gym_comparison <- function(object, type = c("scores", "profile", "improvement"), ...) {
+  check_dots_empty(...)
+  type <- check_choice(type[1L], c("scores", "profile", "improvement"), arg = "type")
+  picture <- if (object$by == "steps") {
+    reached_picture(object)
+  } else {
+    switch(
+      type, scores = scores_picture(object), improvement = improvement_picture(object),
+      profile = shares_picture(
+        object$profile, "score", ggplot2::geom_step(direction = "hv", linewidth = 0.8)
+      ) +
+        picture_labels(x = score_label(object), y = "share of runs that score more")
+    )
+  }
+  bands <- object$by == "steps" || type == "profile"
+  shape <- if (bands) "band" else "bar"
+  notes <- if (length(object$notes)) paste0("note: ", object$notes)
+  picture +
+    picture_labels(
+      if (length(object$envs)) toString(object$envs),
+      paste0(shape, ": ", percent_text(object$level), " interval"), caption = notes
+    ) +
+    theme_gym()
+}
+
+score_label <- function(x) if (is.null(x$reference)) "mean return" else "normalised score"
+
+statistic_names <- c(mean = "mean", median = "median", iqm = "interquartile mean")
+
+# Rows whose names fit a third of four inches.
+named_rows <- function() ggplot2::scale_y_discrete(labels = function(at) broken_texts(at, 18))
+
+scores_picture <- function(x) {
+  table <- x$table
+  table$statistic <- factor(table$statistic, unique(table$statistic))
+  table$training <- factor(table$training, rev(unique(table$training)))
+  ggplot2::ggplot(table, ggplot2::aes(
+    .data$value, .data$training, xmin = .data$lower, xmax = .data$upper, colour = .data$training
+  )) +
+    ggplot2::geom_pointrange() +
+    ggplot2::facet_wrap(
+      ggplot2::vars(.data$statistic), ncol = 1L, labeller = ggplot2::as_labeller(statistic_names)
+    ) +
+    ggplot2::scale_colour_manual(values = named_colours(unique(x$table$training)), guide = "none") +
+    named_rows() +
+    picture_labels(x = score_label(x), y = NULL)
+}
+
+# Lines with bands over scores or steps.
+shares_picture <- function(rows, x, geom) {
+  labels <- unique(rows$training)
+  rows$training <- factor(rows$training, labels)
+  ggplot2::ggplot(rows, ggplot2::aes(
+    .data[[x]], .data$share, colour = .data$training, fill = .data$training
+  )) +
+    ggplot2::geom_ribbon(
+      ggplot2::aes(ymin = .data$lower, ymax = .data$upper), rows[!is.na(rows$lower), ],
+      alpha = 0.25, linetype = "blank", show.legend = FALSE
+    ) +
+    geom +
+    ggplot2::scale_fill_manual(values = named_colours(labels), guide = "none") +
+    key_of_marks(line_marks(labels)) +
+    ggplot2::coord_cartesian(ylim = c(0, 1))
+}
+
+improvement_picture <- function(x) {
+  rows <- x$improvement
+  if (is.null(rows)) {
+    abort_misuse("type", "improvement", NULL,
+                 "There is one training: none could score higher than another.")
+  }
+  rows$pair <- paste0(rows$training, " > ", rows$than)
+  ggplot2::ggplot(rows, ggplot2::aes(
+    .data$probability, factor(.data$pair, rev(.data$pair)), xmin = .data$lower, xmax = .data$upper
+  )) +
+    ggplot2::geom_vline(xintercept = 0.5, linetype = "dashed", colour = gym_colours[["ink"]]) +
+    ggplot2::geom_pointrange(colour = gym_colours[["blue"]]) +
+    ggplot2::coord_cartesian(xlim = c(0, 1)) +
+    named_rows() +
+    picture_labels(x = "probability of a higher score", y = NULL)
+}
+
+reached_picture <- function(x) {
+  # Steps drawn with corners, so that the band has them, too.
+  rows <- do.call(rbind, lapply(split(x$profile, list(x$profile$training, x$profile$env_id),
+                                      drop = TRUE), function(rows) {
+    n <- nrow(rows)
+    corners <- rows[rep(seq_len(n), each = 2L)[-2L * n], ]
+    corners$steps <- rows$steps[rep(seq_len(n), each = 2L)[-1L]]
+    corners
+  }))
+  failed <- x$runs[!x$runs$reached, ]
+  key <- function(rows) paste(rows$training, rows$env_id, rows$steps, sep = "\r")
+  failed$share <- x$profile$share[match(key(failed), key(x$profile))]
+  labels <- unique(x$runs$training)
+  failed$training <- factor(failed$training, labels)
+  rows <- rows[order(match(rows$training, labels)), ]
+  shares_picture(rows, "steps", ggplot2::geom_path(linewidth = 0.8)) +
+    ggplot2::geom_point(data = failed, shape = 3, show.legend = FALSE) +
+    (if (length(unique(rows$env_id)) > 1L) {
+      ggplot2::facet_wrap(
+        ggplot2::vars(.data$env_id), scales = "free_x", labeller = ggplot2::as_labeller(x$envs)
+      )
+    }) +
+    number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
+    picture_labels(x = training_steps_label, y = "share that reached the target")
+}
+
+#' Plot estimates from data
+#'
+#' Show the estimate of each method with its interval, beside the mean return of the data (the
+#' dashed line, with its interval as a band).
+#'
+#' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
+#' prints it.
+#'
+#' @inheritParams plot.gym_rollout
+#' @param x,object The result of [evaluate_offline()].
+#' @param main The title. `NULL`, the default, says what is estimated.
+#' @param ... `plot()` passes its arguments to `autoplot()`, which accepts no others.
+#' @return A ggplot. `plot()` returns it invisibly.
+#' @rdname plot.gym_offline
+#' @exportS3Method ggplot2::autoplot
+#' @examples
+#' set.seed(1)
+#' steps <- data.frame(episode = 1:200, severity = runif(200), action = rep(0:1, 100))
+#' steps$reward <- ifelse(steps$action == 1, steps$severity, 0.4) + rnorm(200, sd = 0.3)
+#' plot(evaluate_offline(steps_data(steps), 1, behavior = policy_random(), seed = 1))
+autoplot.gym_offline <- function(object, ...) {
+  check_dots_empty(...)
+  each <- object$estimates
+  each$method <- factor(each$method, rev(each$method))
+  known <- !is.na(object$observed$estimate)
+  marks <- list(
+    estimate = key_mark("blue", shape = 16),
+    `the data's policy` = if (known) key_mark("ink", line = "dashed")
+  )
+  ggplot2::ggplot(each, ggplot2::aes(x = .data$estimate, y = .data$method)) +
+    (if (known) {
+      list(
+        ggplot2::annotate(
+          "rect", xmin = object$observed$lower, xmax = object$observed$upper, ymin = -Inf,
+          ymax = Inf, fill = "grey90"
+        ),
+        ggplot2::geom_vline(
+          ggplot2::aes(xintercept = .data$estimate, colour = "the data's policy"), object$observed,
+          linetype = "dashed", linewidth = 0.7
+        )
+      )
+    }) +
+    ggplot2::geom_segment(
+      ggplot2::aes(x = .data$lower, xend = .data$upper, yend = .data$method, colour = "estimate"),
+      linewidth = 0.7
+    ) +
+    ggplot2::geom_point(ggplot2::aes(colour = "estimate"), size = 2.5) +
+    key_of_marks(marks) +
+    picture_labels(
+      if (is.null(object$folds)) "Value of the policy, by data" else "Mean value of the rules",
+      paste0(level_text(object$level), " intervals, ", count_of(object$episodes, "episode"),
+             if (!is.null(object$folds)) paste0(", ", object$folds, " folds")),
+      x = if (object$discount < 1) "discounted return" else "return", y = NULL
     ) +
     theme_gym()
 }

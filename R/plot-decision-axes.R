@@ -5,36 +5,29 @@
 mapped_observation <- function(place, call = rlang::caller_env()) {
   space <- place$observation_space
   if (!is.null(space) && !inherits(space, "gym_space_box")) {
-    gym_abort(
-      c(paste0("A decision map shows two numbers of an observation, but observations ",
-               if (!is.null(place$env_id)) paste0("in ", env_text(place), " "), "are of ",
-               format(space), "."),
-        i = "`act(policy, )` gives the action for each single observation."),
-      class = "gym_error_argument", argument = "policy", value = place$policy, call = call
-    )
+    within <- if (!is.null(place$env_id)) paste0("in ", env_text(place), " ")
+    abort_misuse("policy", place$policy, call,
+                 "A decision map shows two numbers of an observation, but observations {within}are
+                  of {format(space)}.",
+                 i = "`act(policy, )` gives the action for each single observation.")
   }
   n <- if (is.null(space)) place$policy$sizes[[1L]] else prod(space$shape)
   if (n < 2) {
-    gym_abort(
-      c("A decision map shows two numbers of an observation, but this policy observes only one.",
-        i = "`curve()` can draw it: `curve(act(policy, matrix(x)), -1, 1)`."),
-      class = "gym_error_argument", argument = "policy", value = place$policy, call = call
-    )
+    abort_misuse("policy", place$policy, call,
+                 "A decision map shows two numbers of an observation, but this policy observes only
+                  one.",
+                 i = "`curve()` can draw it: `curve(act(policy, matrix(x)), -1, 1)`.")
   }
   names <- number_names(space, n)
-  list(
-    names = names, usual = usual_ranges(described_id(place), names),
-    low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)
-  )
-}
-
-# How far each part goes from the middle to either side: a position to the end of an episode, a
-# speed to its usual maximum. NULL if that is not known for all parts.
-usual_ranges <- function(env_id, names) {
-  family <- environment_family(env_id)
+  family <- environment_family(described_id(place))
   limits <- lapply(episode_limits[[family, exact = TRUE]], function(limit) max(limit$at))
   usual <- c(limits, usual_speeds[[family, exact = TRUE]])
-  if (all(names %in% names(usual))) usual
+  list(
+    # How far each part goes from the middle to either side: a position to the end of an episode, a
+    # speed to its usual maximum. NULL if that is not known for all parts.
+    names = names, usual = if (all(names %in% names(usual))) usual,
+    low = space$low %||% rep(-Inf, n), high = space$high %||% rep(Inf, n)
+  )
 }
 
 # These ranges contain 99.5 in 100 steps of 500 episodes of the random policy and of 1,200 episodes
@@ -50,17 +43,13 @@ mapped_axes <- function(observed, x, y, call = rlang::caller_env()) {
     return(1:2)
   }
   if (is.null(x) || is.null(y)) {
-    gym_abort(
-      c("`x` and `y` must name two parts of the observation.", i = observed_text(observed)),
-      class = "gym_error_argument", argument = if (is.null(x)) "x" else "y", call = call
-    )
+    abort_misuse(if (is.null(x)) "x" else "y", NULL, call,
+                 "`x` and `y` must name two parts of the observation.", i = observed_text(observed))
   }
   axes <- c(axis_place(observed, x, "x", call), axis_place(observed, y, "y", call))
   if (axes[[1L]] == axes[[2L]]) {
-    gym_abort(
-      c("`x` and `y` must be two different parts of the observation.", i = observed_text(observed)),
-      class = "gym_error_argument", argument = "y", value = y, call = call
-    )
+    abort_misuse("y", y, call, "`x` and `y` must be two different parts of the observation.",
+                 i = observed_text(observed))
   }
   axes
 }
@@ -71,18 +60,14 @@ axis_place <- function(observed, axis, arg, call) {
     return(as.integer(axis))
   }
   if (!rlang::is_string(axis) || !axis %in% observed$names) {
-    gym_abort(
-      c(paste0("`", arg, "` must be a part of the observation, not ", describe_argument(axis), "."),
-        i = observed_text(observed)),
-      class = "gym_error_argument", argument = arg, value = axis, call = call
-    )
+    abort_misuse(arg, axis, call,
+                 "`{arg}` must be a part of the observation, not {describe_argument(axis)}.",
+                 i = observed_text(observed))
   }
   match(axis, observed$names)
 }
 
-observed_text <- function(observed) {
-  paste0("Its parts are ", few_names(observed$names), ".")
-}
+observed_text <- function(observed) paste0("Its parts are ", few_names(observed$names), ".")
 
 held_at <- function(observed, axes, at, call = rlang::caller_env()) {
   held <- (observed$low + observed$high) / 2
@@ -98,15 +83,9 @@ held_at <- function(observed, axes, at, call = rlang::caller_env()) {
   }
   strange <- setdiff(names(at), observed$names[-axes])
   if (length(strange)) {
-    gym_abort(
-      c(paste0("`at` names ", strange[[1L]], ", which is ", if (strange[[1L]] %in% observed$names) {
-        "on an axis."
-      } else {
-        "no part of the observation."
-      }),
-        i = observed_text(observed)),
-      class = "gym_error_argument", argument = "at", value = at, call = call
-    )
+    is <- if (strange[[1L]] %in% observed$names) "on an axis" else "no part of the observation"
+    abort_misuse("at", at, call, "`at` names {strange[[1L]]}, which is {is}.",
+                 i = observed_text(observed))
   }
   held[names(at)] <- at
   held
@@ -125,11 +104,8 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
   } else if (all(abs(bounds) < 1e6)) {
     bounds
   } else {
-    gym_abort(
-      c(paste0("The range of ", name, " is unknown, because it has no bounds."),
-        i = paste0("Give it as `", arg, "`, or a `path` through it.")),
-      class = "gym_error_argument", argument = arg, call = call
-    )
+    abort_misuse(arg, NULL, call, "The range of {name} is unknown, because it has no bounds.",
+                 i = "Give it as `{arg}`, or a `path` through it.")
   }
 }
 
@@ -137,25 +113,18 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
 
 play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
   if (is.null(env)) {
-    gym_abort(
-      c("`path = TRUE` plays an episode, for which the environment is needed.",
-        i = "Give it as `env`, or the steps of a `rollout(steps = TRUE)` as `path`."),
-      class = "gym_error_argument", argument = "env", value = env, call = call
-    )
+    abort_misuse("env", env, call,
+                 "`path = TRUE` plays an episode, for which the environment is needed.",
+                 i = "Give it as `env`, or the steps of a `rollout(steps = TRUE)` as `path`.")
   }
-  naming_own_call(
-    rollout(env, policy, seed = seed, steps = TRUE, client = client), "rollout", call
-  )
+  naming_own_call(rollout(env, policy, seed = seed, steps = TRUE, client = client), "rollout", call)
 }
 
 path_points <- function(path, names, call = rlang::caller_env()) {
   if (inherits(path, "gym_rollout")) {
     if (!is.data.frame(path$steps)) {
-      gym_abort(
-        c("The rollout has no steps in a table to show as a path.",
-          i = "`rollout(steps = TRUE)` keeps one."),
-        class = "gym_error_argument", argument = "path", value = path, call = call
-      )
+      abort_misuse("path", path, call, "The rollout has no steps in a table to show as a path.",
+                   i = "`rollout(steps = TRUE)` keeps one.")
     }
     path <- path$steps
   }

@@ -90,16 +90,17 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
                          xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
                          client = gym_client()) {
   if (missing(policy) || inherits(env, c("gym_policy", "gym_training")) || is.function(env)) {
-    gym_abort(
-      c(if (missing(policy)) "`policy` is missing." else "`env` must be an environment.",
-        i = paste("The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;",
-                  "without one it is `decision_map(policy = policy)`.")),
-      class = "gym_error_argument", argument = "policy", value = NULL
-    )
+    abort_misuse("policy", NULL, rlang::current_env(),
+                 if (missing(policy)) "`policy` is missing." else "`env` must be an environment.",
+                 i = "The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;
+                      without one it is `decision_map(policy = policy)`.")
   }
   policy <- trained_policy(policy)
   check_policy(policy)
-  check_mappable(policy)
+  if (inherits(policy, "gym_policy_random")) {
+    abort_misuse("policy", policy, rlang::current_env(),
+                 "There is nothing to map: a random policy ignores the observation.")
+  }
   xlim <- plain_numbers(xlim)
   ylim <- plain_numbers(ylim)
   check_limits(xlim)
@@ -108,27 +109,21 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   check_count(size, min = 2)
   check_seed(seed)
   place <- mapped_place(env, policy, client)
-  if (inherits(place$observation_space, "gym_space_discrete")) {
-    check_discrete_actions(place, rlang::current_env())
-    return(new_state_map(place, states_in_play(env, client), rlang::current_env()))
-  }
-  if (is_counted_parts(place$observation_space)) {
-    check_discrete_actions(place, rlang::current_env())
-    return(new_parts_map(place, x, y, xlim, ylim, plain_numbers(at), rlang::current_env()))
+  if (is_counted(place$observation_space)) {
+    return(counted_map(
+      place, env, client, x, y, xlim, ylim, plain_numbers(at), rlang::current_env()
+    ))
   }
   observed <- mapped_observation(place)
   axes <- mapped_axes(observed, x, y)
-  if (isTRUE(path)) {
-    path <- play_path(env, policy, seed, client)
-  }
+  if (isTRUE(path)) path <- play_path(env, policy, seed, client)
   way <- if (!is.null(path)) path_points(path, observed$names[axes])
   xlim <- xlim %||% mapped_range(observed, axes[[1L]], way$x, "xlim")
   ylim <- ylim %||% mapped_range(observed, axes[[2L]], way$y, "ylim")
   held <- held_at(observed, axes, at)
   points <- expand.grid(
     x = seq(xlim[[1L]], xlim[[2L]], length.out = size),
-    y = seq(ylim[[1L]], ylim[[2L]], length.out = size),
-    KEEP.OUT.ATTRS = FALSE
+    y = seq(ylim[[1L]], ylim[[2L]], length.out = size), KEEP.OUT.ATTRS = FALSE
   )
   values <- matrix(held, nrow(points), length(held), byrow = TRUE)
   values[, axes] <- as.matrix(points)
@@ -144,20 +139,6 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
     ),
     class = "gym_decision_map"
   )
-}
-
-# Several numbers with few values each, like Blackjack's.
-is_counted_parts <- function(space) {
-  !is.null(space) && !is.null(space_index(space)) && length(digit_values(space)) > 1L
-}
-
-check_mappable <- function(policy, call = rlang::caller_env()) {
-  if (inherits(policy, "gym_policy_random")) {
-    gym_abort(
-      "There is nothing to map: a random policy ignores the observation.",
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
-    )
-  }
 }
 
 check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
@@ -179,18 +160,16 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
     policy <- policy_bind(policy, known, call = call)
     return(list(
       policy = policy, observation_space = known$observation_space,
-      action_space = known$action_space, env_id = known$spec$id,
-      wrappers = known$spec$wrappers
+      action_space = known$action_space, env_id = known$spec$id, wrappers = known$spec$wrappers
     ))
   }
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
   if (!inherits(policy, "gym_policy_network") && !played) {
-    gym_abort(
-      c(paste0("Without `env` a decision map needs a network, or a model that was played, ",
-               "not ", policy_text(policy), "."),
-        i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y = )`."),
-      class = "gym_error_argument", argument = "env", value = env, call = call
-    )
+    abort_misuse("env", env, call,
+                 "Without `env` a decision map needs a network, or a model that was played, not
+                  {policy_text(policy)}.",
+                 i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y =
+                      )`.")
   }
   c(list(policy = policy), policy[c("observation_space", "action_space", "env_id", "wrappers")])
 }
@@ -207,44 +186,31 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
     network_outputs(place$policy, values, call)
   }
   if (inherits(space, "gym_space_box")) {
-    return(decide_value(place, values, outputs, action, call))
+    n <- prod(space$shape)
+    check_count(action, max = n, call = call)
+    numbers <- number_rows(policy_actions(place, values, outputs))
+    limits <- c(space$low[[action]], space$high[[action]])
+    return(list(
+      kind = "value", values = as.numeric(numbers[, action]),
+      actions = action_parts(place$env_id, n)[[action]], limits = if (all(is.finite(limits))) limits
+    ))
   }
   if (!is.null(space) && !inherits(space, "gym_space_discrete")) {
-    gym_abort(
-      paste0("A decision map shows actions that are discrete or a Box, not of ", format(space),
-             "."),
-      class = "gym_error_argument", argument = "policy", value = place$policy, call = call
-    )
+    abort_misuse("policy", place$policy, call,
+                 "A decision map shows actions that are discrete or a Box, not of {format(space)}.")
   }
-  decide_action(place, values, outputs)
-}
-
-# A discrete action; or the output, if a single bounded output chooses between two actions.
-decide_action <- function(place, values, outputs) {
-  space <- place$action_space
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)
-  if (!is.null(outputs) && identical(place$policy$output, "softmax") && n == 2L) {
-    list(kind = "output", values = softmax_rows(outputs)[, 2L], actions = actions)
-  } else if (!is.null(outputs) && ncol(outputs) == 1L && n == 2L && has_range(place$policy)) {
-    unit <- unit_outputs(outputs[, 1L], output_activation(place$policy))
-    list(kind = "output", values = unit, actions = actions)
-  } else {
-    chosen <- as.integer(policy_actions(place, values, outputs))
-    list(kind = "choice", values = chosen, actions = actions)
+  two <- !is.null(outputs) && n == 2L
+  # The output, if a single bounded output chooses between two actions.
+  shown <- if (two && identical(place$policy$output, "softmax")) {
+    softmax_rows(outputs)[, 2L]
+  } else if (two && ncol(outputs) == 1L && has_range(place$policy)) {
+    unit_outputs(outputs[, 1L], output_activation(place$policy))
   }
-}
-
-decide_value <- function(place, values, outputs, action, call) {
-  space <- place$action_space
-  n <- prod(space$shape)
-  check_count(action, max = n, call = call)
-  numbers <- number_rows(policy_actions(place, values, outputs))
-  limits <- c(space$low[[action]], space$high[[action]])
   list(
-    kind = "value", values = as.numeric(numbers[, action]),
-    actions = action_parts(place$env_id, n)[[action]],
-    limits = if (all(is.finite(limits))) limits
+    kind = if (is.null(shown)) "choice" else "output", actions = actions,
+    values = shown %||% as.integer(policy_actions(place, values, outputs))
   )
 }
 
@@ -280,20 +246,13 @@ print.gym_decision_map <- function(x, ...) {
     }, ", ", states),
     paste0(x$x, " by ", x$y, ", ", size, " x ", size, " points")
   )
+  few <- utils::head(x$at, 4L)
+  held <- paste(names(few), "=", number_text_each(few), collapse = ", ")
+  more <- if (length(x$at) > 4L) paste(", and", length(x$at) - 4L, "more")
   cat(
     paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", env_text(x)), ": ", shows),
-    paste0("Policy: ", policy_text(x$policy)),
-    held_text(x$at),
+    paste0("Policy: ", policy_text(x$policy)), if (length(x$at)) paste0("Held: ", held, more),
     sep = "\n"
   )
   invisible(x)
-}
-
-held_text <- function(at) {
-  if (!length(at)) {
-    return(NULL)
-  }
-  few <- at[seq_len(min(length(at), 4L))]
-  more <- if (length(at) > 4L) paste(", and", length(at) - 4L, "more")
-  paste0("Held: ", paste(names(few), "=", number_text_each(few), collapse = ", "), more)
 }

@@ -1,24 +1,23 @@
 # The decision map of a policy that observes the number of a state, or several such numbers: its
 # action in each of them.
 
-check_discrete_actions <- function(place, call) {
-  if (!inherits(place$action_space, "gym_space_discrete")) {
-    gym_abort(
-      paste0("A map of states shows actions that are Discrete, not ", format(place$action_space),
-             "."),
-      class = "gym_error_argument", argument = "policy", value = place$policy, call = call
-    )
-  }
+# One number, or several with few values each, like Blackjack's.
+is_counted <- function(space) {
+  inherits(space, "gym_space_discrete") ||
+    !is.null(space) && !is.null(space_index(space)) && length(digit_values(space)) > 1L
 }
 
-# The states in which an episode may choose an action, a logical vector; `NULL` without a model.
-states_in_play <- function(env, client) {
-  none <- function(cnd) NULL
-  model <- tryCatch(
-    if (!is.null(env)) env_model(env, client = client),
-    gym_error_no_model = none, gym_error_http_400 = none
-  )
-  if (!is.null(model)) state_kinds(model)$reached
+counted_map <- function(place, env, client, x, y, xlim, ylim, at, call) {
+  if (!inherits(place$action_space, "gym_space_discrete")) {
+    abort_misuse("policy", place$policy, call,
+                 "A map of states shows actions that are Discrete, not
+                  {format(place$action_space)}.")
+  }
+  if (inherits(place$observation_space, "gym_space_discrete")) {
+    new_state_map(place, env, client, call)
+  } else {
+    new_parts_map(place, x, y, xlim, ylim, at, call)
+  }
 }
 
 # Whether a policy has an action in some rows of its table: one is valid, and not all valid ones
@@ -43,12 +42,19 @@ actions_where <- function(some, policy, batch_at, place) {
   actions
 }
 
-new_state_map <- function(place, in_play, call) {
+new_state_map <- function(place, env, client, call) {
+  none <- function(cnd) NULL
+  model <- tryCatch(
+    if (!is.null(env)) env_model(env, client = client),
+    gym_error_no_model = none, gym_error_http_400 = none
+  )
+  # The states in which an episode may choose an action: all, if there is no model.
+  in_play <- if (is.null(model)) TRUE else state_kinds(model)$reached
   space <- place$observation_space
   states <- state_numbers(space)
   place$call <- call
   actions <- actions_where(
-    (in_play %||% TRUE) & has_action(place$policy, seq_along(states)),
+    in_play & has_action(place$policy, seq_along(states)),
     greedy_policy(place$policy), function(rows) states[rows], place
   )
   structure(
@@ -94,9 +100,7 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
     has_action(place$policy, rows), place$policy,
     function(rows) named_batch(space, values_batch(space, parts[rows, , drop = FALSE])), place
   )
-  if (inherits(place$policy, "gym_policy_table")) {
-    grid$value <- row_max(place$policy$q)[rows]
-  }
+  if (inherits(place$policy, "gym_policy_table")) grid$value <- row_max(place$policy$q)[rows]
   structure(
     list(
       grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],

@@ -25,7 +25,7 @@ autoplot.gym_decision_map <- function(object, ...) {
   ggplot2::ggplot(data$points, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_raster(ggplot2::aes(fill = .data$shown)) +
     data$fill +
-    border_line(data) +
+    data$border +
     path_layers(object$path) +
     ggplot2::scale_x_continuous(expand = c(0, 0)) +
     ggplot2::scale_y_continuous(expand = c(0, 0)) +
@@ -38,19 +38,6 @@ map_labels <- function(x, subtitle, axes = TRUE, ...) {
   labels <- Filter(Negate(is.null), list(x = of_part("x"), y = of_part("y")))
   title <- env_text(x) %||% "Decision map"
   do.call(picture_labels, c(list(title, subtitle), labels, list(...)))
-}
-
-# The line between two actions, if both occur: ggplot2 warns about an empty line.
-border_line <- function(data) {
-  if (is.null(data$border)) {
-    return(NULL)
-  }
-  inside <- range(data$points$shown)
-  if (data$border > inside[[1L]] && data$border < inside[[2L]]) {
-    ggplot2::geom_contour(
-      ggplot2::aes(z = .data$shown), breaks = data$border, colour = "black", linewidth = 0.8
-    )
-  }
 }
 
 path_layers <- function(path) {
@@ -74,39 +61,36 @@ path_layers <- function(path) {
 #' @noRd
 decision_plot_data <- function(x) {
   points <- stats::setNames(x$grid, c("x", "y", "shown"))
-  switch(
-    x$kind, output = output_map(x, points), choice = choice_map(x, points),
-    value = value_map(x, points)
-  )
-}
-
-# The colours span the range of the outputs around one half, because small weights make small
-# differences.
-output_map <- function(x, points) {
-  reach <- max(abs(points$shown - 0.5), 0.01)
-  above <- paste0("output, above 0.5:\n", x$actions[[2L]])
+  if (x$kind == "choice") {
+    start <- as.integer(sub(":.*", "", x$actions[[1L]]))
+    numbers <- start + seq_along(x$actions) - 1L
+    found <- x$actions[sort(unique(points$shown - start + 1))]
+    points$shown <- shown_actions(points$shown, numbers, x$actions)
+    return(list(points = points, fill = action_fill(numbers, x$actions, taken = found)))
+  }
+  if (x$kind == "output") {
+    # The colours span the range of the outputs around one half, because small weights make small
+    # differences.
+    border <- 0.5
+    limits <- border + c(-1, 1) * max(abs(points$shown - border), 0.01)
+    name <- paste0("output, above 0.5:\n", x$actions[[2L]])
+  } else {
+    limits <- x$limits %||% range(points$shown)
+    # One colour if there is only one value.
+    if (diff(limits) == 0) limits <- limits + c(-1, 1)
+    name <- x$actions
+    border <- mean(limits)
+  }
+  inside <- range(points$shown)
   list(
-    points = points, fill = diverging_fill(above, 0.5 + c(-reach, reach)), border = 0.5
+    points = points, fill = continuous_fill(name, diverging_colours, limits = limits),
+    # The line between two actions, if both occur: ggplot2 warns about an empty line.
+    border = if (border > inside[[1L]] && border < inside[[2L]]) {
+      ggplot2::geom_contour(
+        ggplot2::aes(z = .data$shown), breaks = border, colour = "black", linewidth = 0.8
+      )
+    }
   )
-}
-
-value_map <- function(x, points) {
-  limits <- x$limits %||% range(points$shown)
-  # One colour if there is only one value.
-  limits <- if (diff(limits) > 0) limits else limits + c(-1, 1)
-  list(points = points, fill = diverging_fill(x$actions, limits), border = mean(limits))
-}
-
-diverging_fill <- function(name, limits) {
-  continuous_fill(name, diverging_colours, limits = limits)
-}
-
-choice_map <- function(x, points) {
-  start <- as.integer(sub(":.*", "", x$actions[[1L]]))
-  numbers <- start + seq_along(x$actions) - 1L
-  found <- x$actions[sort(unique(points$shown - start + 1))]
-  points$shown <- shown_actions(points$shown, numbers, x$actions)
-  list(points = points, fill = action_fill(numbers, x$actions, taken = found))
 }
 
 # States -------------------------------------------------------------------------------
@@ -162,11 +146,24 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   } else {
     state_map_data(object, columns, directions, passenger, destination)
   }
-  if (type == "q") data$q <- q_of_table(object, data)
-  picture <- if (is.null(data$columns)) {
-    if (type == "q") q_cells(data) else action_points(data)
-  } else {
+  if (type == "q") {
+    if (!inherits(object$policy, "gym_policy_table")) {
+      abort_misuse("type", object$policy, rlang::current_env(),
+                   "Values of actions are those of a `policy_table()`, not of
+                    {describe_argument(object$policy)}.")
+    }
+    data$cells$value <- ifelse(is.na(data$cells$action), NA, 0)
+    data$q <- q_of_cells(object$policy$q, object$grid$state, data)
+  }
+  picture <- if (!is.null(data$columns)) {
     grid_picture(data, if (type == "q") q_layers(data) else taken_layers(data))
+  } else if (type == "q") {
+    q_cells(data)
+  } else {
+    ggplot2::ggplot(data$cells, ggplot2::aes(.data$state, .data$action)) +
+      ggplot2::geom_point(colour = gym_colours[["blue"]], na.rm = TRUE) +
+      ggplot2::expand_limits(y = range(data$numbers)) +
+      state_axes(data)
   }
   shown <- if (type == "q") "values of actions" else policy_subtitle(object)
   picture + map_labels(object, c(shown, taxi_subtitle(data)), axes = by_parts, width = 40)
@@ -184,27 +181,6 @@ taken_layers <- function(data) {
     ),
     action_layers(data, cells)
   )
-}
-
-# The action in each state without a grid.
-action_points <- function(data) {
-  ggplot2::ggplot(data$cells, ggplot2::aes(.data$state, .data$action)) +
-    ggplot2::geom_point(colour = gym_colours[["blue"]], na.rm = TRUE) +
-    ggplot2::expand_limits(y = range(data$numbers)) +
-    state_axes(data)
-}
-
-q_of_table <- function(x, data, call = rlang::caller_env()) {
-  if (!inherits(x$policy, "gym_policy_table")) {
-    gym_abort(
-      paste0("Values of actions are those of a `policy_table()`, not of ",
-             describe_argument(x$policy), "."),
-      class = "gym_error_argument", argument = "type", value = x$policy, call = call
-    )
-  }
-  q <- x$policy$q
-  data$cells$value <- ifelse(is.na(data$cells$action), NA, 0)
-  q_of_cells(q, x$grid$state, data)
 }
 
 #' Compute the data of a map of states

@@ -9,13 +9,6 @@ pick_stills <- function(frames, n) {
   list(frames = frames[at], steps = as.integer(at - 1))
 }
 
-filmstrip_picture <- function(x, episode, n, candidate, call = rlang::caller_env()) {
-  check_count(n, call = call)
-  stills <- pick_stills(episode_frames(x, episode, candidate, call), n)
-  check_suggested("png", "draw a filmstrip", call)
-  filmstrip(stills)
-}
-
 # A panel for each frame.
 filmstrip <- function(stills) {
   pictures <- crop_blank(lapply(stills$frames, unclass))

@@ -3,29 +3,40 @@
 # A picture of cells with the columns `row` and `column`. `layers` are below the environment's
 # marks. Parts of an observation have axes, and panels for the others.
 grid_picture <- function(data, layers) {
-  if (!is.null(data$axes)) {
-    return(named_grid_picture(data, layers))
-  }
-  picture <- ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) + layers
+  axes <- data$axes
+  picture <- ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
+    layers +
+    taxi_layers(data) +
+    (if (length(data$panels)) ggplot2::facet_wrap(data$panels, labeller = ggplot2::label_both))
   if (isTRUE(data$has_axes)) {
     return(
       picture +
-        (if (length(data$panels)) {
-          ggplot2::facet_wrap(data$panels, labeller = ggplot2::label_both)
-        }) +
         ggplot2::scale_x_continuous(breaks = few_breaks, expand = c(0, 0)) +
         ggplot2::scale_y_continuous(breaks = few_breaks, expand = c(0, 0)) +
         theme_gym()
     )
   }
-  picture +
-    taxi_layers(data) +
-    ggplot2::scale_x_continuous(expand = c(0.01, 0)) +
-    ggplot2::scale_y_reverse(expand = c(0.01, 0)) +
-    ggplot2::coord_fixed() +
-    theme_gym_bare() +
+  named <- function(mark) if (is.null(axes)) ggplot2::waiver() else mark
+  picture <- picture +
+    ggplot2::scale_x_continuous(
+      breaks = named(seq_along(axes[[2L]])), labels = named(as.character(axes[[2L]])),
+      expand = c(0.01, 0)
+    ) +
+    ggplot2::scale_y_reverse(
+      breaks = named(seq_along(axes[[1L]])), labels = named(as.character(axes[[1L]])),
+      expand = c(0.01, 0)
+    ) +
+    ggplot2::coord_fixed()
+  if (is.null(axes)) {
     # The key fits beside a square grid, or above a wide one.
-    ggplot2::theme(legend.position = if (data$columns > 1.5 * data$rows) "top" else "right")
+    place <- if (data$columns > 1.5 * data$rows) "top" else "right"
+    picture + theme_gym_bare() + ggplot2::theme(legend.position = place)
+  } else {
+    picture +
+      ggplot2::labs(x = names(axes)[[2L]], y = names(axes)[[1L]]) +
+      theme_gym() +
+      ggplot2::theme(panel.grid = ggplot2::element_blank())
+  }
 }
 
 # The width of a square cell in millimetres, if the picture is four inches wide.
@@ -76,8 +87,7 @@ number_texts <- function(values) {
   largest <- max(abs(values[is.finite(values)]), 1e-6)
   # Three digits, with as many decimals for 1 as for 0.99.
   decimals <- max(0, 1 - floor(log10(largest) - 1e-6))
-  text <- sprintf("%.*f", as.integer(decimals), values)
-  text <- sub("^-(0[.]?0*)$", "\\1", text)
+  text <- sub("^-(0[.]?0*)$", "\\1", sprintf("%.*f", as.integer(decimals), values))
   ifelse(is.na(values), "", text)
 }
 
@@ -93,8 +103,7 @@ ink_on <- function(values) {
 # The directions of the actions on Gymnasium's grids, by the start of the environment's id; see
 # https://gymnasium.farama.org/environments/toy_text/.
 known_directions <- list(
-  FrozenLake = c("left", "down", "right", "up"),
-  CliffWalking = c("up", "right", "down", "left"),
+  FrozenLake = c("left", "down", "right", "up"), CliffWalking = c("up", "right", "down", "left"),
   Taxi = c("down", "up", "right", "left", "P", "D")
 )
 
@@ -123,58 +132,19 @@ action_directions <- function(directions, known, labels, call) {
 place_states <- function(cells, known, columns, own_columns, passenger, destination, walls, call,
                          values = NULL) {
   if (length(values) > 1L && is.null(columns)) {
-    return(cells_by_name(cells, values))
+    # The first column of names goes down, the second to the right, and others make panels.
+    axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))
+    cells$row <- match(values[[1L]], axes[[1L]])
+    cells$column <- match(values[[2L]], axes[[2L]])
+    panels <- names(values)[-(1:2)]
+    cells[panels] <- values[panels]
+    return(list(cells = cells, rows = length(axes[[1L]]), columns = length(axes[[2L]]),
+                axes = axes, panels = panels))
   }
   if (known == "Taxi" && is.null(columns)) {
-    taxi_cells(cells, passenger, destination, walls, call)
-  } else {
-    grid_cells(cells, columns %||% own_columns, call)
+    return(taxi_cells(cells, passenger, destination, walls, call))
   }
-}
-
-# The first column of names goes down, the second to the right, and others make panels.
-cells_by_name <- function(cells, values) {
-  axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))
-  cells$row <- match(values[[1L]], axes[[1L]])
-  cells$column <- match(values[[2L]], axes[[2L]])
-  panels <- names(values)[-(1:2)]
-  cells[panels] <- values[panels]
-  list(
-    cells = cells, rows = length(axes[[1L]]), columns = length(axes[[2L]]), axes = axes,
-    panels = panels
-  )
-}
-
-named_grid_picture <- function(data, layers) {
-  at <- lapply(data$axes, seq_along)
-  ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
-    layers +
-    ggplot2::scale_x_continuous(
-      breaks = at[[2L]], labels = as.character(data$axes[[2L]]), expand = c(0.01, 0)
-    ) +
-    ggplot2::scale_y_reverse(
-      breaks = at[[1L]], labels = as.character(data$axes[[1L]]), expand = c(0.01, 0)
-    ) +
-    (if (length(data$panels)) ggplot2::facet_wrap(data$panels, labeller = ggplot2::label_both)) +
-    ggplot2::coord_fixed() +
-    ggplot2::labs(x = names(data$axes)[[2L]], y = names(data$axes)[[1L]]) +
-    theme_gym() +
-    ggplot2::theme(panel.grid = ggplot2::element_blank())
-}
-
-# The axis of states without a grid, with their names.
-state_axis <- function(space, ...) {
-  if (is.null(space$values)) {
-    return(ggplot2::scale_x_continuous(breaks = few_breaks, ...))
-  }
-  ggplot2::scale_x_continuous(
-    breaks = state_numbers(space), labels = value_labels(space),
-    guide = ggplot2::guide_axis(check.overlap = TRUE), ...
-  )
-}
-
-# Puts states into rows and columns, if the number of columns is known.
-grid_cells <- function(cells, columns, call) {
+  columns <- columns %||% own_columns
   if (is.null(columns)) {
     return(list(cells = cells))
   }
@@ -186,6 +156,17 @@ grid_cells <- function(cells, columns, call) {
   cells$row <- (seq_len(count) - 1L) %/% columns + 1L
   cells$column <- (seq_len(count) - 1L) %% columns + 1L
   list(cells = cells, columns = columns, rows = count / columns)
+}
+
+# The axis of states without a grid, with their names.
+state_axis <- function(space) {
+  if (is.null(space$values)) {
+    return(ggplot2::scale_x_continuous(breaks = few_breaks))
+  }
+  ggplot2::scale_x_continuous(
+    breaks = state_numbers(space), labels = value_labels(space),
+    guide = ggplot2::guide_axis(check.overlap = TRUE)
+  )
 }
 
 # A step down adds the number of columns to the state's number: it is the most common difference
@@ -237,12 +218,9 @@ taxi_layers <- function(data) {
 }
 
 taxi_subtitle <- function(data) {
-  if (is.null(data$stands)) {
-    return(NULL)
+  if (!is.null(data$stands)) {
+    where <- c(paste("at", data$stands$label), "in the taxi")[[data$from + 1L]]
+    c(paste0("passenger ", where, ", destination ", data$stands$label[[data$to + 1L]]),
+      "P picks up, D drops off")
   }
-  stand <- data$stands$label
-  where <- if (data$from == 4) "in the taxi" else paste("at", stand[[data$from + 1L]])
-  c(
-    paste0("passenger ", where, ", destination ", stand[[data$to + 1L]]), "P picks up, D drops off"
-  )
 }

@@ -42,13 +42,21 @@
 autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
                                         client = gym_client()) {
   check_dots_empty(...)
-  policy <- bind_to(object, env, client)
+  # Without `env` a policy keeps the spaces of the environment in which it was played.
+  policy <- if (is.null(env)) object else policy_bind(object, known_spaces(env, client))
   data <- network_plot_data(policy, neurons, digits)
   units <- data$neurons
   weights <- data$weights[order(data$weights$width), ]
   weights <- weights[weights$width > 0, ]
   crowded <- max(table(units$x)) > 8L
   name <- c(positive = "positive weight", negative = "negative weight")
+  numbers <- weights[nzchar(weights$label), ]
+  place <- ggplot2::aes(.data$label_x, .data$label_y, label = .data$label)
+  # Three dots in place of left-out neurons.
+  dots <- data.frame(x = rep(data$dots$x, each = 3L),
+                     y = rep(data$dots$y, each = 3L) + c(-0.02, 0, 0.02))
+  inputs <- units[units$x == 0, ]
+  outputs <- units[units$x == max(units$x), ]
   ggplot2::ggplot(units, ggplot2::aes(.data$x, .data$y)) +
     ggplot2::geom_segment(
       ggplot2::aes(
@@ -58,8 +66,12 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     ) +
     ggplot2::geom_point(shape = 21, size = if (crowded) 3.5 else 6, fill = "white") +
     ggplot2::geom_text(ggplot2::aes(label = "1"), units[units$bias, ], size = 3) +
-    ggplot2::geom_point(data = dots_between(data$dots), size = 0.4) +
-    number_layers(weights[nzchar(weights$label), ]) +
+    ggplot2::geom_point(data = dots, size = 0.4) +
+    # White behind a number, so that its line does not cross it; to the right of its place, where it
+    # does not cover the neuron.
+    ggplot2::geom_label(place, numbers, size = 2.8, hjust = 0, colour = "white", fill = "white",
+                        label.padding = ggplot2::unit(0.1, "lines")) +
+    ggplot2::geom_text(place, numbers, size = 2.8, hjust = -0.06) +
     ggplot2::scale_colour_manual(
       name = NULL, limits = unname(name),
       values = stats::setNames(gym_colours[c("blue", "gold")], name),
@@ -71,13 +83,16 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     ) +
     # The names of inputs and outputs are in the place of axis labels, which has room for them.
     ggplot2::scale_x_continuous(
-      breaks = data$layers$x, labels = data$layers$label,
-      expand = ggplot2::expansion(mult = 0.07)
+      breaks = data$layers$x, labels = data$layers$label, expand = ggplot2::expansion(mult = 0.07)
     ) +
-    side_names(units) +
+    ggplot2::scale_y_continuous(
+      breaks = inputs$y, labels = inputs$label, limits = c(0, 1),
+      sec.axis = ggplot2::sec_axis(~., breaks = outputs$y, labels = outputs$label)
+    ) +
     ggplot2::coord_cartesian(clip = "off") +
     picture_labels(
-      env_text(policy) %||% "Policy", c(network_sizes(policy), "wider lines are further from 0")
+      env_text(policy) %||% "Policy",
+      c(paste("network", paste(policy$sizes, collapse = "-")), "wider lines are further from 0")
     ) +
     theme_gym_bare() +
     ggplot2::theme(
@@ -87,50 +102,12 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     )
 }
 
-# The policy with the spaces of `env`, whose names the diagram shows. Without `env` it keeps those
-# of the environment in which it was played.
-bind_to <- function(policy, env, client, call = rlang::caller_env()) {
-  if (is.null(env)) policy else policy_bind(policy, known_spaces(env, client, call), call = call)
-}
-
-network_sizes <- function(x) paste("network", paste(x$sizes, collapse = "-"))
-
-# White behind a number, so that its line does not cross it.
-number_layers <- function(weights) {
-  place <- ggplot2::aes(.data$label_x, .data$label_y, label = .data$label)
-  # To the right of its place, where it does not cover the neuron.
-  list(
-    ggplot2::geom_label(place, weights, size = 2.8, hjust = 0, colour = "white", fill = "white",
-                        label.padding = ggplot2::unit(0.1, "lines")),
-    ggplot2::geom_text(place, weights, size = 2.8, hjust = -0.06)
-  )
-}
-
-# Three dots in place of left-out neurons.
-dots_between <- function(dots) {
-  data.frame(x = rep(dots$x, each = 3L), y = rep(dots$y, each = 3L) + c(-0.02, 0, 0.02))
-}
-
-side_names <- function(units) {
-  first <- units[units$x == 0, ]
-  last <- units[units$x == max(units$x), ]
-  ggplot2::scale_y_continuous(
-    breaks = first$y, labels = first$label, limits = c(0, 1),
-    sec.axis = ggplot2::sec_axis(~., breaks = last$y, labels = last$label)
-  )
-}
-
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_policy <- function(object, ...) {
-  gym_abort(
-    c(paste0("Only a network can be drawn, not a policy that is ", format(object), "."),
-      i = if (inherits(object, "gym_policy_table")) {
-        table_hint
-      } else {
-        "`policy_network()` makes one."
-      }),
-    class = "gym_error_argument", argument = "x", value = object
-  )
+  is_table <- inherits(object, "gym_policy_table")
+  abort_misuse("x", object, rlang::current_env(),
+               "Only a network can be drawn, not a policy that is {format(object)}.",
+               i = if (is_table) table_hint else "`policy_network()` makes one.")
 }
 
 # Where neurons and weights stand, and what they are called -------------------------------
@@ -151,7 +128,17 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
   layers <- length(policy$sizes)
   sizes <- policy$sizes + c(rep(as.integer(isTRUE(policy$bias)), layers - 1L), 0L)
-  each <- lapply(seq_len(layers), function(layer) place_neurons(sizes[[layer]], layer, most))
+  each <- lapply(seq_len(layers), function(layer) {
+    size <- sizes[[layer]]
+    # If there are too many neurons, draw the first ones and the last one, with a gap for dots.
+    shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
+    y <- 1 - (seq_along(shown) - 0.5) / length(shown)
+    gap <- is.na(shown)
+    list(
+      neurons = data.frame(layer = layer, neuron = shown[!gap], x = layer - 1, y = y[!gap]),
+      dots = data.frame(x = rep(layer - 1, sum(gap)), y = y[gap])
+    )
+  })
   neurons <- do.call(rbind, lapply(each, function(placed) placed$neurons))
   neurons$bias <- neurons$neuron > policy$sizes[neurons$layer]
   neurons$label <- ""
@@ -160,21 +147,9 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   neurons$label[first] <- c(input_labels(policy), "bias")[neurons$neuron[first]]
   neurons$label[last] <- output_labels(policy)[neurons$neuron[last]]
   list(
-    neurons = neurons,
-    dots = do.call(rbind, lapply(each, function(placed) placed$dots)),
+    neurons = neurons, dots = do.call(rbind, lapply(each, function(placed) placed$dots)),
     weights = place_weights(policy, neurons, digits),
     layers = data.frame(x = seq_len(layers) - 1, label = c("observation", policy$activation))
-  )
-}
-
-# If there are too many neurons, draw the first ones and the last one, with a gap for dots.
-place_neurons <- function(size, layer, most) {
-  shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
-  y <- 1 - (seq_along(shown) - 0.5) / length(shown)
-  gap <- is.na(shown)
-  list(
-    neurons = data.frame(layer = layer, neuron = shown[!gap], x = layer - 1, y = y[!gap]),
-    dots = data.frame(x = rep(layer - 1, sum(gap)), y = y[gap])
   )
 }
 

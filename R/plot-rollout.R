@@ -74,44 +74,35 @@ autoplot.gym_rollout <- function(object, ..., type = c("returns", "trajectory", 
   type <- check_choice(type[1L], c("returns", "trajectory", "filmstrip"), arg = "type")
   rollouts <- given_rollouts(arguments_as_written(quote(object)))
   x <- rollouts[[1L]]
-  if (type != "returns") check_single_rollout(rollouts, type)
+  several <- length(rollouts) > 1L
+  if (several && type != "returns") {
+    abort_misuse("...", NULL, rlang::current_env(),
+                 "A {type} shows one rollout, not {length(rollouts)}.")
+  }
+  comparison <- several || !is.null(x$episodes$candidate)
   switch(type,
-    returns = if (is_comparison(rollouts)) comparison_picture(rollouts) else returns_picture(x),
+    returns = if (comparison) comparison_picture(rollouts) else returns_picture(x),
     trajectory = trajectory_picture(x, trajectory_plot_data(x, episode, variables, candidate)),
-    filmstrip = filmstrip_picture(x, episode, n, candidate)
+    filmstrip = {
+      check_count(n)
+      stills <- pick_stills(episode_frames(x, episode, candidate), n)
+      check_suggested("png", "draw a filmstrip")
+      filmstrip(stills)
+    }
   )
 }
 
 given_rollouts <- function(values, call = rlang::caller_env()) {
   rollouts <- only_results(values, "gym_rollout", call)
-  check_have_episodes(rollouts, call)
-  rollouts
-}
-
-check_have_episodes <- function(rollouts, call) {
   for (rollout in rollouts) {
     if (!nrow(rollout$episodes)) {
-      gym_abort(
-        c(paste0("A rollout in ", env_text(rollout), " has no episode to plot: it was interrupted ",
-                 "before the first batch of episodes had ended."),
-          i = "The same call of `rollout()` with its `seed` plays it again."),
-        class = "gym_error_argument", argument = "x", value = rollout, call = call
-      )
+      abort_misuse("x", rollout, call,
+                   "A rollout in {env_text(rollout)} has no episode to plot: it was interrupted
+                    before the first batch of episodes had ended.",
+                   i = "The same call of `rollout()` with its `seed` plays it again.")
     }
   }
-}
-
-check_single_rollout <- function(rollouts, type, call = rlang::caller_env()) {
-  if (length(rollouts) > 1L) {
-    gym_abort(
-      paste0("A ", type, " shows one rollout, not ", length(rollouts), "."),
-      class = "gym_error_argument", argument = "...", call = call
-    )
-  }
-}
-
-is_comparison <- function(rollouts) {
-  length(rollouts) > 1L || !is.null(rollouts[[1L]]$episodes$candidate)
+  rollouts
 }
 
 # Returns ------------------------------------------------------------------------------
@@ -122,10 +113,27 @@ returns_picture <- function(x) {
   returns <- x$episodes$return
   kind <- returns_kind(returns)
   counts <- kind != "density"
+  draw <- function(geom, ...) {
+    geom(fill = gym_colours[["sky"]], alpha = 0.6, colour = gym_colours[["blue"]], ...)
+  }
   ggplot2::ggplot(data.frame(value = returns), ggplot2::aes(.data$value)) +
     switch(
-      kind, bars = bar_layers(returns), histogram = histogram_layers(returns),
-      density = density_layers()
+      kind,
+      bars = list(
+        draw(ggplot2::geom_bar, width = bar_width(returns), position = "identity"),
+        ggplot2::scale_x_continuous(
+          breaks = bar_marks(returns) %||% ggplot2::waiver(),
+          # A single bar must not fill the picture.
+          expand = ggplot2::expansion(mult = if (length(unique(returns)) == 1L) 2 else 0.05)
+        )
+      ),
+      histogram = list(
+        draw(ggplot2::geom_histogram, binwidth = bin_width(returns), boundary = max(returns) + 0.5),
+        ggplot2::scale_x_continuous(breaks = few_breaks)
+      ),
+      density = list(
+        draw(ggplot2::geom_density), ggplot2::geom_rug(sides = "b", colour = gym_colours[["blue"]])
+      )
     ) +
     ggplot2::geom_vline(
       xintercept = stats::median(returns), colour = gym_colours[["brown"]], linetype = "dashed",
@@ -144,43 +152,10 @@ returns_picture <- function(x) {
     theme_gym()
 }
 
-density_layers <- function() {
-  list(
-    ggplot2::geom_density(
-      fill = gym_colours[["sky"]], alpha = 0.6, colour = gym_colours[["blue"]]
-    ),
-    ggplot2::geom_rug(sides = "b", colour = gym_colours[["blue"]])
-  )
-}
-
-histogram_layers <- function(returns) {
-  list(
-    ggplot2::geom_histogram(
-      binwidth = bin_width(returns), boundary = max(returns) + 0.5, fill = gym_colours[["sky"]],
-      alpha = 0.6, colour = gym_colours[["blue"]]
-    ),
-    ggplot2::scale_x_continuous(breaks = few_breaks)
-  )
-}
-
 # Bins are whole numbers wide, and end at the largest return, which may be the largest possible one.
 bin_width <- function(returns) max(1, ceiling((diff(range(returns)) + 1) / most_bins))
 
 most_bins <- 40L
-
-bar_layers <- function(returns) {
-  list(
-    ggplot2::geom_bar(
-      width = bar_width(returns), position = "identity", fill = gym_colours[["sky"]], alpha = 0.6,
-      colour = gym_colours[["blue"]]
-    ),
-    ggplot2::scale_x_continuous(
-      breaks = bar_marks(returns) %||% ggplot2::waiver(),
-      # A single bar must not fill the picture.
-      expand = ggplot2::expansion(mult = if (length(unique(returns)) == 1L) 2 else 0.05)
-    )
-  )
-}
 
 # With few different returns a density would show values that no episode had, so use bars.
 most_bars <- 10L

@@ -62,16 +62,14 @@ autoplot.gym_solution <- function(object, ..., type = c("values", "q"), columns 
   } else {
     grid_picture(data, c(if (type == "q") q_layers(data) else value_layers(data), end_layers(data)))
   }
-  picture + picture_labels(
-    object$model$spec$id, c(solution_subtitle(object, type), taxi_subtitle(data)), width = 40
-  )
-}
-
-solution_subtitle <- function(x, type) {
-  whose <- if (is.null(x$actions)) "of a policy"
-  what <- if (type == "q") "values of actions" else "values of states"
-  within <- if (!is.null(x$horizon)) paste("within", count_of(x$horizon, "step"))
-  paste(c(if (is.null(whose)) "best", what, whose, within), collapse = " ")
+  subtitle <- paste(c(
+    if (!is.null(object$actions)) "best",
+    if (type == "q") "values of actions" else "values of states",
+    if (is.null(object$actions)) "of a policy",
+    if (!is.null(object$horizon)) paste("within", count_of(object$horizon, "step"))
+  ), collapse = " ")
+  picture +
+    picture_labels(object$model$spec$id, c(subtitle, taxi_subtitle(data)), width = 40)
 }
 
 # Data ----------------------------------------------------------------------------
@@ -179,9 +177,7 @@ value_layers <- function(data) {
   )
 }
 
-value_fill <- function() {
-  continuous_fill("value", value_colours())
-}
+value_fill <- function() continuous_fill("value", value_colours())
 
 # The corners of a triangle: the two of the side to which an action leads, and the middle of the
 # cell.

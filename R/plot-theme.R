@@ -33,10 +33,8 @@ most_named_actions <- 6L
 
 # What the fill of a region or cell is: the name of its action, or of many actions the number.
 shown_actions <- function(actions, numbers, labels) {
-  if (length(numbers) > most_named_actions) {
-    return(actions)
-  }
-  factor(labels[match(actions, numbers)], labels)
+  named <- length(numbers) <= most_named_actions
+  if (named) factor(labels[match(actions, numbers)], labels) else actions
 }
 
 # The scale of these values. `taken` are those that the key shows.
@@ -85,9 +83,7 @@ theme_gym_panels <- function() {
 theme_gym_bare <- function() {
   list(
     ggplot2::labs(x = NULL, y = NULL), theme_gym(),
-    ggplot2::theme(
-      panel.grid = ggplot2::element_blank(), axis.text = ggplot2::element_blank()
-    )
+    ggplot2::theme(panel.grid = ggplot2::element_blank(), axis.text = ggplot2::element_blank())
   )
 }
 
@@ -98,8 +94,7 @@ picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, capti
   joined <- paste(subtitle, collapse = ", ")
   lines <- unlist(lapply(if (nchar(joined) > width) subtitle else joined, broken_text, width))
   ggplot2::labs(
-    title = broken_text(title, 38),
-    subtitle = if (length(lines)) paste(lines, collapse = "\n"),
+    title = broken_text(title, 38), subtitle = if (length(lines)) paste(lines, collapse = "\n"),
     caption = if (length(caption)) paste(broken_texts(caption, 1.25 * width), collapse = "\n"),
     !!!axes
   )
@@ -144,14 +139,10 @@ key_mark <- function(colour, shape = NA, line = "blank") {
 key_of_marks <- function(marks) {
   marks <- marks[lengths(marks) > 0L]
   each <- function(part) unlist(lapply(marks, function(mark) mark[[part]]))
-  list(
-    ggplot2::scale_colour_manual(
-      name = NULL, values = each("colour"), limits = names(marks), labels = key_labels,
-      guide = rows_of_key(
-        names(marks),
-        override.aes = list(shape = unname(each("shape")), linetype = unname(each("line")))
-      )
-    )
+  drawn <- list(shape = unname(each("shape")), linetype = unname(each("line")))
+  ggplot2::scale_colour_manual(
+    name = NULL, values = each("colour"), limits = names(marks), labels = key_labels,
+    guide = rows_of_key(names(marks), override.aes = drawn)
   )
 }
 
@@ -198,9 +189,7 @@ target_line <- function(target, ...) {
 }
 
 target_mark <- function(target) {
-  if (length(target)) {
-    stats::setNames(list(key_mark("ink", line = "dashed")), target_label(target))
-  }
+  if (length(target)) stats::setNames(list(key_mark("ink", line = "dashed")), target_label(target))
 }
 
 finite_target <- function(target) if (!is.null(target) && is.finite(target)) target

@@ -35,13 +35,23 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
   if (length(trainings) > 1L && type == "returns") {
     return(trainings_picture(trainings))
   }
-  check_one_training(trainings, type)
+  if (length(trainings) > 1L) {
+    abort_misuse("type", type, rlang::current_env(),
+                 "A picture of {type} shows one training, not {length(trainings)}.")
+  }
   x <- trainings[[1L]]
-  check_has_history(x)
+  if (!NROW(x$history)) {
+    abort_misuse("x", x, rlang::current_env(),
+                 "There is nothing to plot: the training ended before its first iteration did.")
+  }
   if (type == "diagnostics") {
     return(diagnostics_picture(x))
   }
-  evaluations <- placed_evaluations(x)
+  evaluations <- x$evaluations
+  evaluations$steps <- evaluation_steps(x)
+  # Of several final ones the last counts.
+  earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
+  evaluations <- evaluations[!earlier, ]
   final <- evaluations[evaluations$kind == "final", ]
   target <- finite_target(x$target)
   range <- paste("range of", returned_unit(x$agent))
@@ -69,38 +79,11 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
       stats::setNames(list(key_mark("sky", shape = 15)), range),
       list(`their median` = key_mark("blue", line = "solid")),
       if (nrow(evaluations) > nrow(final)) list(`the policy` = key_mark("brown", shape = 1)),
-      if (nrow(final)) list(`final evaluation` = key_mark("brown", shape = 16)),
-      target_mark(target)
+      if (nrow(final)) list(`final evaluation` = key_mark("brown", shape = 16)), target_mark(target)
     )) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
     picture_labels(trainings_title(list(x)), x = training_steps_label, y = "return") +
     theme_gym()
-}
-
-check_one_training <- function(trainings, type, call = rlang::caller_env()) {
-  if (length(trainings) > 1L) {
-    gym_abort(
-      paste0("A picture of ", type, " shows one training, not ", length(trainings), "."),
-      class = "gym_error_argument", argument = "type", value = type, call = call
-    )
-  }
-}
-
-check_has_history <- function(x, call = rlang::caller_env()) {
-  if (!NROW(x$history)) {
-    gym_abort(
-      "There is nothing to plot: the training ended before its first iteration did.",
-      class = "gym_error_argument", argument = "x", value = x, call = call
-    )
-  }
-}
-
-# The evaluations and their places in steps. Of several final ones the last counts.
-placed_evaluations <- function(x) {
-  evaluations <- x$evaluations
-  evaluations$steps <- evaluation_steps(x)
-  earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
-  evaluations[!earlier, ]
 }
 
 # Searches -----------------------------------------------------------------------------
@@ -134,8 +117,17 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
     return(autoplot.gym_policy_network(object$policy, ...))
   }
   check_dots_empty(...)
-  check_has_rounds(object)
   means <- object$rounds
+  if (!nrow(means)) {
+    abort_misuse("x", object, rlang::current_env(),
+                 "There is nothing to plot: the search ended before its first round was played to
+                  its end.")
+  }
+  outcome <- if (object$solved) {
+    paste("solved in round", object$round)
+  } else if (!is.null(object$target)) {
+    paste("not solved in", count_of(nrow(means), "round"))
+  }
   target <- finite_target(object$target)
   ggplot2::ggplot(object$episodes, ggplot2::aes(.data$round, .data$return)) +
     target_line(target) +
@@ -161,26 +153,9 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
     )) +
     ggplot2::scale_x_continuous(breaks = round_ticks(max(means$round))) +
     picture_labels(
-      paste("Random search in", env_text(object)), search_outcome(object), x = "round", y = "return"
+      paste("Random search in", env_text(object)), outcome, x = "round", y = "return"
     ) +
     theme_gym()
-}
-
-check_has_rounds <- function(x, call = rlang::caller_env()) {
-  if (nrow(x$rounds) == 0L) {
-    gym_abort(
-      "There is nothing to plot: the search ended before its first round was played to its end.",
-      class = "gym_error_argument", argument = "x", value = x, call = call
-    )
-  }
-}
-
-search_outcome <- function(x) {
-  if (x$solved) {
-    paste("solved in round", x$round)
-  } else if (!is.null(x$target)) {
-    paste("not solved in", count_of(nrow(x$rounds), "round"))
-  }
 }
 
 # Bandits ------------------------------------------------------------------------------

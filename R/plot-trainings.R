@@ -58,8 +58,8 @@ iterations_picture <- function(trainings, call = rlang::caller_env()) {
     vapply(reached, function(one) nrow(one$history), 0L)
   })
   if (!length(unlist(needed))) {
-    gym_abort("There is nothing to plot: no seed has reached the target.",
-              class = "gym_error_argument", argument = "x", value = trainings[[1L]], call = call)
+    abort_misuse("x", trainings[[1L]], call,
+                 "There is nothing to plot: no seed has reached the target.")
   }
   counts <- paste(lengths(needed), "of", lengths(each))
   several <- length(each) > 1L
@@ -77,8 +77,7 @@ iterations_picture <- function(trainings, call = rlang::caller_env()) {
     number_axis(ggplot2::scale_x_continuous) +
     ggplot2::scale_y_continuous(breaks = function(limits) unique(round(pretty(limits)))) +
     picture_labels(
-      trainings_title(trainings),
-      if (!several) paste(counts, "seeds have reached the target"),
+      trainings_title(trainings), if (!several) paste(counts, "seeds have reached the target"),
       x = paste(if (are_searches(trainings)) "rounds" else "iterations", "to the target"),
       y = "seeds"
     ) +
@@ -98,6 +97,11 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
   # One for each environment.
   target <- unlist(lapply(split(trainings, ids), common_target))
   seeds <- any(vapply(trainings, inherits, NA, "gym_trainings"))
+  ended <- if (seeds) {
+    "thin line: a seed has ended, and counts with its last evaluation"
+  } else {
+    "thin line: the training has ended, with this evaluation"
+  }
   ggplot2::ggplot(curves, ggplot2::aes(.data$steps, colour = .data$label)) +
     ggplot2::geom_ribbon(
       ggplot2::aes(ymin = .data$lower, ymax = .data$upper, fill = .data$label), alpha = 0.25,
@@ -125,10 +129,9 @@ trainings_picture <- function(trainings, call = rlang::caller_env()) {
     key_of_marks(c(line_marks(labels), target_mark(target))) +
     number_axis(ggplot2::scale_x_continuous, limits = c(0, NA)) +
     picture_labels(
-      trainings_title(trainings),
-      if (seeds) "line: median of the seeds, band: their middle half",
+      trainings_title(trainings), if (seeds) "line: median of the seeds, band: their middle half",
       x = training_steps_label, y = "mean return of the policy",
-      caption = c(if (any(curves$ended)) ended_caption(seeds), unequal_rules(trainings))
+      caption = c(if (any(curves$ended)) ended, unequal_rules(trainings))
     ) +
     theme_gym()
 }
@@ -141,14 +144,6 @@ lines_of <- function(curves, rows) {
 
 points_each <- function(curves) stats::ave(curves$steps, curves$training, FUN = length)
 
-ended_caption <- function(seeds) {
-  if (seeds) {
-    "thin line: a seed has ended, and counts with its last evaluation"
-  } else {
-    "thin line: the training has ended, with this evaluation"
-  }
-}
-
 # The common target, or NULL.
 common_target <- function(trainings) {
   targets <- unique(lapply(unname(trainings), function(x) as.numeric(x$target)))
@@ -159,22 +154,14 @@ common_target <- function(trainings) {
 curve_places <- 200L
 
 evaluation_curves <- function(x, label, call) {
-  each <- lapply(each_training(x), evaluation_curve)
+  each <- lapply(each_training(x), function(training) {
+    data.frame(steps = evaluation_steps(training), mean_return = training$evaluations$mean_return)
+  })
   each <- each[vapply(each, nrow, 0L) > 0L]
   if (!length(each)) {
-    gym_abort(
-      paste0("There is nothing to plot: no policy of ", label, " was evaluated."),
-      class = "gym_error_argument", argument = "x", value = x, call = call
-    )
+    abort_misuse("x", x, call, "There is nothing to plot: no policy of {label} was evaluated.")
   }
   each
-}
-
-# The evaluations of a training.
-evaluation_curve <- function(training) {
-  data.frame(
-    steps = evaluation_steps(training), mean_return = training$evaluations$mean_return
-  )
 }
 
 #' Compute the line and the band of one training or several seeds
@@ -263,11 +250,9 @@ varied_settings <- function(names) {
 diagnostics_picture <- function(x, call = rlang::caller_env()) {
   names <- names(agent_log(x$agent))
   if (!length(names)) {
-    gym_abort(
-      c(paste0("The training has no diagnostics: ", training_label(x), " logs none."),
-        i = "`agent_ppo()` and other agents with a method of `agent_log()` do."),
-      class = "gym_error_argument", argument = "type", value = "diagnostics", call = call
-    )
+    abort_misuse("type", "diagnostics", call,
+                 "The training has no diagnostics: {training_label(x)} logs none.",
+                 i = "`agent_ppo()` and other agents with a method of `agent_log()` do.")
   }
   rows <- do.call(rbind, lapply(names, function(name) {
     data.frame(steps = x$history$steps, name = name, value = x$history[[name]])

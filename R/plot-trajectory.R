@@ -1,11 +1,18 @@
 # An episode's observations and actions over its steps.
 
 trajectory_picture <- function(x, data) {
-  near <- near_rows(data)
+  # The limits that are drawn.
+  keep <- vapply(seq_len(nrow(data$limits)), function(i) {
+    limit <- data$limits[i, ]
+    length(near_limits(limit$at, data$values$value[data$values$panel == limit$panel])) > 0L
+  }, NA)
+  near <- data$limits[keep, ]
+  near$panel <- factor(near$panel, data$panels$panel)
   panels <- nrow(data$panels)
   columns <- if (panels > 3L) 2L else 1L
   values <- panel_values(data)
   of_kind <- function(kind) values[values$kind == kind, ]
+  named <- levels(values$part)[nzchar(levels(values$part))]
   place <- ggplot2::aes(.data$time, .data$value, colour = .data$part)
   ggplot2::ggplot() +
     lapply(names(limit_colours), function(kind) {
@@ -25,7 +32,12 @@ trajectory_picture <- function(x, data) {
       )
     }) +
     choice_layers(of_kind("choice"), data$choices) +
-    part_scale(levels(values$part)) +
+    # The numbers of an action share a panel and have a key; other lines have one colour.
+    ggplot2::scale_colour_manual(
+      name = NULL, breaks = named,
+      values = c(stats::setNames(gym_colours[["blue"]], ""), named_colours(named)),
+      guide = if (length(named)) rows_of_key(named) else "none"
+    ) +
     ggplot2::facet_wrap(
       ggplot2::vars(.data$panel), scales = "free_y", ncol = columns,
       labeller = ggplot2::as_labeller(panel_titles(data), wrapped_strips())
@@ -34,9 +46,7 @@ trajectory_picture <- function(x, data) {
     ggplot2::scale_y_continuous(
       breaks = trajectory_breaks(values), guide = ggplot2::guide_axis(check.overlap = TRUE)
     ) +
-    picture_labels(
-      env_text(x), c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL
-    ) +
+    picture_labels(env_text(x), c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL) +
     theme_gym_panels() +
     # If the last panel stands alone, the title of its axis is below it.
     ggplot2::theme(
@@ -59,23 +69,14 @@ panel_values <- function(data) {
   values
 }
 
-# The numbers of an action share a panel and have a key; other lines have one colour.
-part_scale <- function(parts) {
-  named <- parts[nzchar(parts)]
-  ggplot2::scale_colour_manual(
-    name = NULL, breaks = named,
-    values = c(stats::setNames(gym_colours[["blue"]], ""), named_colours(named)),
-    guide = if (length(named)) rows_of_key(named) else "none"
-  )
-}
-
 # Discrete actions: a bar for each step, in the action's place and colour. Actions that never occur
 # have a place, too.
 choice_layers <- function(values, choices) {
   if (is.null(choices)) {
     return(NULL)
   }
-  labels <- choice_labels(choices)
+  number <- as.character(choices$value)
+  labels <- ifelse(choices$label == number, number, paste0(number, ": ", choices$label))
   values$choice <- factor(labels[match(values$value, choices$value)], labels)
   ends <- data.frame(
     time = 0, value = range(choices$value) + c(-0.5, 0.5), panel = values$panel[[1L]]
@@ -92,11 +93,6 @@ choice_layers <- function(values, choices) {
   )
 }
 
-choice_labels <- function(choices) {
-  number <- as.character(choices$value)
-  ifelse(choices$label == number, number, paste0(number, ": ", choices$label))
-}
-
 # If a value is constant, the axis of its panel has one mark at this value. ggplot2 passes only the
 # limits of a panel: 0.05 to either side of the constant.
 trajectory_breaks <- function(values) {
@@ -108,17 +104,6 @@ trajectory_breaks <- function(values) {
     own <- constants[abs(constants - middle) <= 1e-9 * max(1, abs(middle))]
     if (length(own) && diff(limits) < 0.11) own[[1L]] else few_breaks(limits, 4)
   }
-}
-
-# The limits that are drawn.
-near_rows <- function(data) {
-  keep <- vapply(seq_len(nrow(data$limits)), function(i) {
-    limit <- data$limits[i, ]
-    length(near_limits(limit$at, data$values$value[data$values$panel == limit$panel])) > 0L
-  }, NA)
-  near <- data$limits[keep, ]
-  near$panel <- factor(near$panel, data$panels$panel)
-  near
 }
 
 # The titles of panels give the values at which episodes end.
@@ -146,12 +131,16 @@ most_actions <- length(series_colours)
 trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1,
                                  call = rlang::caller_env()) {
   row <- episode_row(x, episode, candidate, call)
-  check_steps(x, call)
-  own <- x$steps$episode == episode & (x$steps$candidate %||% candidate) == candidate
-  steps <- x$steps[own, ]
+  if (is.null(x$steps)) {
+    abort_misuse("x", x, call, "This rollout was played without its steps being kept.",
+                 i = "`rollout(..., steps = TRUE)` keeps them in a table.")
+  }
+  own <- x$episodes[row, ]
+  ending <- if (own$terminated) "terminated" else "truncated"
+  in_own <- x$steps$episode == episode & (x$steps$candidate %||% candidate) == candidate
+  steps <- x$steps[in_own, ]
   shown <- trajectory_columns(steps, variables, call)
-  values <- lapply(c(shown$observed, shown$actions), function(name) steps[[name]])
-  names(values) <- c(shown$observed, shown$actions)
+  values <- as.list(steps)[c(shown$observed, shown$actions)]
   choices <- action_choices(x, values[shown$actions])
   labels <- c(
     observation_labels(described_id(x), shown$observed),
@@ -164,16 +153,17 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
   list(
     panels = data.frame(panel = labels[first], kind = unname(kinds[first])),
     values = data.frame(
-      panel = rep(labels, each = n), name = rep(names(values), each = n),
-      step = steps$step, time = steps$step - 1L,
-      value = as.numeric(unlist(lapply(values, as.numeric)))
+      panel = rep(labels, each = n), name = rep(names(values), each = n), step = steps$step,
+      time = steps$step - 1L, value = as.numeric(unlist(lapply(values, as.numeric)))
     ),
     limits = trajectory_limits(described_id(x), shown$observed, labels),
-    choices = choices,
+    choices = choices, length = n, ending = ending,
     actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
-    length = n,
-    ending = if (steps$terminated[[n]]) "terminated" else "truncated",
-    subtitle = trajectory_subtitle(x$episodes[row, ])
+    subtitle = paste0(
+      if (!is.null(own$candidate)) paste0("candidate ", own$candidate, ", "), "episode ",
+      own$episode, ": return ", number_text(own$return), ", ", ending, " after ",
+      count_of(own$length, "step")
+    )
   )
 }
 
@@ -184,16 +174,6 @@ episode_row <- function(x, episode, candidate, call) {
   own <- which(candidates == candidate)
   check_count(episode, max = length(own), call = call)
   own[[episode]]
-}
-
-check_steps <- function(x, call) {
-  if (is.null(x$steps)) {
-    gym_abort(
-      c("This rollout was played without its steps being kept.",
-        i = "`rollout(..., steps = TRUE)` keeps them in a table."),
-      class = "gym_error_argument", argument = "x", value = x, call = call
-    )
-  }
 }
 
 #' Choose the columns to show
@@ -212,9 +192,9 @@ trajectory_columns <- function(steps, variables, call) {
   } else {
     unknown <- setdiff(variables, possible)
     if (!is.character(variables) || length(unknown)) {
-      must <- paste0(
-        "names of columns of the steps (", text_list(possible), ")"
-      )
+      few <- paste0("\"", utils::head(possible, 10L), "\"", collapse = ", ")
+      more <- if (length(possible) > 10L) ", ..."
+      must <- paste0("names of columns of the steps (", few, more, ")")
       abort_argument(variables, must, "variables", call)
     }
     observed <- unique(variables)
@@ -232,11 +212,6 @@ first_few <- function(names, most, what, argument = NULL) {
     class = "gym_message_variables"
   )
   names[seq_len(most)]
-}
-
-text_list <- function(names, most = 10L) {
-  more <- if (length(names) > most) ", ..."
-  paste0(paste0("\"", utils::head(names, most), "\"", collapse = ", "), more)
 }
 
 # Actions ---------------------------------------------------------------------------
@@ -286,9 +261,7 @@ trajectory_limits <- function(env_id, observed, labels) {
       panel = labels[[match(name, observed)]], at = limit$at, kind = limit$kind, text = limit$text
     )
   })
-  none <- data.frame(
-    panel = character(), at = numeric(), kind = character(), text = character()
-  )
+  none <- data.frame(panel = character(), at = numeric(), kind = character(), text = character())
   do.call(rbind, c(list(none), rows))
 }
 
@@ -300,12 +273,4 @@ near_limits <- function(at, value) {
   }
   seen <- range(value, finite = TRUE)
   at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
-}
-
-# `row` is the episode's row in the table of episodes.
-trajectory_subtitle <- function(row) {
-  ending <- if (row$terminated) "terminated" else "truncated"
-  of <- if (!is.null(row$candidate)) paste0("candidate ", row$candidate, ", ")
-  paste0(of, "episode ", row$episode, ": return ", number_text(row$return), ", ", ending,
-         " after ", count_of(row$length, "step"))
 }

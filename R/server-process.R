@@ -25,9 +25,7 @@ launch_server <- function(python, arguments, timeout, token = NULL, call = rlang
   }
   started <- await_start(process, log, timeout, call)
   if (!is.null(started)) {
-    return(c(
-      started, list(process = process, python = python, log = log, pid = process$get_pid())
-    ))
+    return(c(started, list(process = process, python = python, log = log, pid = process$get_pid())))
   }
   lines <- log_tail(log)
   own <- grep(server_line_start, lines, value = TRUE)
@@ -44,33 +42,23 @@ launch_server <- function(python, arguments, timeout, token = NULL, call = rlang
 # environment variables of a process, but its arguments.
 start_python <- function(python, arguments, ..., token = NULL) {
   variables <- server_environment()
-  if (!is.null(token)) {
-    variables[[token_variable]] <- token()
-  }
+  if (!is.null(token)) variables[[token_variable]] <- token()
   with_own_tree_id(tryCatch(
-    processx::process$new(
-      python, arguments, ..., env = variables, windows_hide_window = TRUE
-    ),
+    processx::process$new(python, arguments, ..., env = variables, windows_hide_window = TRUE),
     error = function(cnd) NULL
   ))
 }
 
 # Why a Python could not be started. A bare name is looked for on the PATH.
 not_started_reason <- function(python) {
-  if (basename(python) != python && !file.exists(python)) {
-    "there is no such file"
-  } else {
-    "it cannot be run"
-  }
+  gone <- basename(python) != python && !file.exists(python)
+  if (gone) "there is no such file" else "it cannot be run"
 }
 
 # Why a Python cannot run the server, from its output.
 refusal_reason <- function(lines) {
-  lines <- lines[nzchar(lines)]
-  if (!length(lines)) {
-    return("it ended without output")
-  }
-  sub("^gym_server cannot run on this Python [(].*[)]: ", "", utils::tail(lines, 1L))
+  last <- utils::tail(c("it ended without output", lines[nzchar(lines)]), 1L)
+  sub("^gym_server cannot run on this Python [(].*[)]: ", "", last)
 }
 
 # The start of a line in which the server itself says why it cannot start. Other lines come from a
@@ -82,8 +70,8 @@ port_hint <- function(line) {
   parts <- regmatches(line, regexec("port ([0-9]+) on ([^ ]+) cannot be used", line))[[1L]]
   if (length(parts)) {
     host <- sub("^0[.]0[.]0[.]0$", "127.0.0.1", parts[[3L]])
-    port_holder(paste0("http://", if (grepl(":", host)) paste0("[", host, "]") else host, ":",
-                       parts[[2L]]))
+    if (grepl(":", host)) host <- paste0("[", host, "]")
+    port_holder(paste0("http://", host, ":", parts[[2L]]))
   }
 }
 
@@ -135,11 +123,11 @@ await_start <- function(process, log, timeout, call) {
     }
     process$poll_io(as.integer(ceiling(left * 1000)))
     lines <- c(lines, process$read_output_lines())
-    address <- said_after("Server starting at: ", lines)
-    if (!is.null(address)) {
+    said <- lines[startsWith(lines, "Server starting at: ")]
+    if (length(said)) {
+      address <- sub("Server starting at: ", "", said[[1L]], fixed = TRUE)
       # A server that listens on all addresses is also at the loopback address.
-      url <- sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)
-      return(list(url = url))
+      return(list(url = sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)))
     }
     if (!process$is_incomplete_output()) {
       await_end(process, 5)
@@ -148,17 +136,8 @@ await_start <- function(process, log, timeout, call) {
   }
 }
 
-# The rest of the first line with this beginning, or NULL.
-said_after <- function(beginning, lines) {
-  line <- lines[startsWith(lines, beginning)]
-  if (length(line)) substring(line[[1L]], nchar(beginning) + 1L)
-}
-
 log_tail <- function(log, n = 20L) {
-  if (!file.exists(log)) {
-    return(character())
-  }
-  utils::tail(readLines(log, warn = FALSE), n)
+  utils::tail(if (file.exists(log)) readLines(log, warn = FALSE) else character(), n)
 }
 
 # Why a server has ended, in words; `NULL` if it was stopped. Its log has a line about that by the
@@ -189,9 +168,7 @@ end_reason <- function(process, log) {
 abort_server_start <- function(message, log_lines, call, hint = NULL) {
   gym_abort(
     c(message, x = if (length(log_lines)) paste(log_lines, collapse = "\n"), i = hint),
-    class = "gym_error_server_start",
-    log = log_lines,
-    call = call
+    class = "gym_error_server_start", log = log_lines, call = call
   )
 }
 
@@ -205,9 +182,7 @@ stop_server <- function(server, timeout = 15) {
   await_end(process, 1)
   terminate_server(server)
   await_end(process, timeout)
-  if (process$is_alive()) {
-    process$kill()
-  }
+  if (process$is_alive()) process$kill()
 }
 
 # Closes the server's standard input, which stops it.

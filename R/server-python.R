@@ -5,52 +5,32 @@
 #' @noRd
 abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
   named <- named_python(python)
-  gym_abort(
-    if (is.null(named)) {
-      no_python_message(refusals)
-    } else {
-      named_python_message(named, refusals, python)
-    },
-    class = "gym_error_server_start",
-    refusals = refusals,
-    call = call
-  )
-}
-
-# The message for users who do not know Python; gym_sitrep() has the details.
-no_python_message <- function(refusals) {
   own <- refusals[names(refusals) %in% installed_server()$python]
-  if (length(own)) {
-    return(c(
-      "The Python that was installed for the server cannot run it.",
-      x = paste0(names(own), ": ", own),
-      i = "`gym::gym_server_install()` installs it again."
-    ))
-  }
-  c(
-    "The server needs a Python of its own, which is not installed yet.",
-    i = "`gym::gym_server_install()` installs it.",
-    i = if (!rlang::is_interactive()) {
-      "With the environment variable GYM_INSTALL=1 a script does so by itself."
-    }
-  )
-}
-
-# The message for users who chose a Python.
-named_python_message <- function(named, refusals, python) {
-  by <- if (is.null(python)) "GYM_PYTHON" else "`python`"
-  unset <- if (is.null(python)) " (`Sys.unsetenv(\"GYM_PYTHON\")`)"
-  c(
-    paste0("The Python that ", by, " names cannot run the server."),
-    x = paste0(named, ": ", refusals),
-    i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
-      paste("What it lacks, in a terminal:", pip_install_server(quote_for_terminal(named)))
-    },
-    i = paste0(
-      "Without ", by, unset,
-      " the session uses the one that `gym::gym_server_install()` installs."
+  message <- if (!is.null(named)) {
+    # For users who chose a Python.
+    by <- if (is.null(python)) "GYM_PYTHON" else "`python`"
+    unset <- if (is.null(python)) " (`Sys.unsetenv(\"GYM_PYTHON\")`)"
+    c(
+      paste0("The Python that ", by, " names cannot run the server."),
+      x = paste0(named, ": ", refusals),
+      i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
+        paste("What it lacks, in a terminal:", pip_install_server(quote_for_terminal(named)))
+      },
+      i = paste0("Without ", by, unset, " the session uses the one that ",
+                 "`gym::gym_server_install()` installs.")
     )
-  )
+  } else if (length(own)) {
+    # For users who do not know Python; gym_sitrep() has the details.
+    c("The Python that was installed for the server cannot run it.",
+      x = paste0(names(own), ": ", own), i = "`gym::gym_server_install()` installs it again.")
+  } else {
+    c("The server needs a Python of its own, which is not installed yet.",
+      i = "`gym::gym_server_install()` installs it.",
+      i = if (!rlang::is_interactive()) {
+        "With the environment variable GYM_INSTALL=1 a script does so by itself."
+      })
+  }
+  gym_abort(message, class = "gym_error_server_start", refusals = refusals, call = call)
 }
 
 # The command by which a Python installs the server.
@@ -97,9 +77,7 @@ python_candidates <- function(python = NULL) {
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
   # The folder WindowsApps has a program named python that opens the Store.
   path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
-  if (lacks_developer_tools()) {
-    path <- setdiff(path, "/usr/bin")
-  }
+  if (lacks_developer_tools()) path <- setdiff(path, "/usr/bin")
   found <- c(pythons_in(places), installed_server()$python, pythons_in(path))
   # The Python of an environment may be a link to one elsewhere that lacks its packages.
   found[!duplicated(paste(normalizePath(dirname(found)), normalizePath(found)))]

@@ -20,23 +20,24 @@
 #' @examples
 #' gym_sitrep()
 gym_sitrep <- function() {
-  found <- sitrep_findings()
-  class(found) <- c("gym_sitrep", class(found))
-  print(found)
-  invisible(found)
-}
-
-sitrep_findings <- function() {
   url <- Sys.getenv("GYM_SERVER_URL")
-  rbind(
+  found <- rbind(
     sitrep_r(),
     attempt_rows("Python", "environment", sitrep_environment()),
     attempt_rows("Python", "uv", finding("Python", "uv", find_uv(timeout = 3) %||%
       "not found, it would be downloaded if needed")),
     attempt_rows("Python", "Pythons", sitrep_pythons(needed = !nzchar(url))),
     attempt_rows("servers", "this session's", sitrep_own_servers(url)),
-    if (nzchar(url)) attempt_rows("servers", "GYM_SERVER_URL", sitrep_named_server(url))
+    if (nzchar(url)) {
+      place <- if (is_server_address(url)) local_place(sub("/+$", "", url))
+      fix <- if (is.null(place)) "Sys.unsetenv(\"GYM_SERVER_URL\")" else start_call(place)
+      what <- paste(without_passwords(url), "(GYM_SERVER_URL)")
+      attempt_rows("servers", "GYM_SERVER_URL", sitrep_server(url, what, fix))
+    }
   )
+  class(found) <- c("gym_sitrep", class(found))
+  print(found)
+  invisible(found)
 }
 
 finding <- function(topic, what, finding, state = "ok", fix = NA_character_) {
@@ -87,30 +88,29 @@ sitrep_r <- function() {
 # Measured: updates of PPO with 64 and 256 rows, two hidden layers of 64, took 2.0 and 2.5 times as
 # long with the reference.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
-  if (!is_reference_blas(file)) {
-    return(finding("R", "BLAS", file))
+  if (is_reference_blas(file)) {
+    finding("R", "BLAS", paste0(
+      if (nzchar(file)) file else "R's own", ": the reference; with OpenBLAS agents with ",
+      "gradients, such as agent_ppo(), learn about twice as fast",
+      if (file.exists("/etc/debian_version")) " (apt install libopenblas0)"
+    ), "note")
+  } else {
+    finding("R", "BLAS", file)
   }
-  finding("R", "BLAS", paste0(
-    if (nzchar(file)) file else "R's own", ": the reference; with OpenBLAS agents with gradients, ",
-    "such as agent_ppo(), learn about twice as fast",
-    if (file.exists("/etc/debian_version")) " (apt install libopenblas0)"
-  ), "note")
 }
 
 sitrep_environment <- function() {
   there <- installed_server()
+  folder <- environment_folder()
   if (!is.null(there)) {
     extras <- if (length(there$extras)) toString(there$extras) else "none"
-    return(finding("Python", "environment", paste0(there$folder, " (extras: ", extras, ")")))
+    finding("Python", "environment", paste0(there$folder, " (extras: ", extras, ")"))
+  } else if (dir.exists(folder)) {
+    found <- paste(folder, "is damaged, or its installation was not finished")
+    finding("Python", "environment", found, "wrong", "gym_server_install()")
+  } else {
+    finding("Python", "environment", "not installed", "note")
   }
-  if (dir.exists(environment_folder())) {
-    return(finding(
-      "Python", "environment",
-      paste(environment_folder(), "is damaged, or its installation was not finished"),
-      "wrong", "gym_server_install()"
-    ))
-  }
-  finding("Python", "environment", "not installed", "note")
 }
 
 # The first Python that runs the server, after those that cannot. `needed`: whether none is wrong.
@@ -154,16 +154,6 @@ sitrep_own_servers <- function(named) {
   ))
 }
 
-sitrep_named_server <- function(url) {
-  what <- paste(without_passwords(url), "(GYM_SERVER_URL)")
-  place <- if (is_server_address(url)) local_place(sub("/+$", "", url))
-  sitrep_server(url, what, if (is.null(place)) {
-    "Sys.unsetenv(\"GYM_SERVER_URL\")"
-  } else {
-    start_call(place)
-  })
-}
-
 # Asks one server what it is. Its errors say what is wrong.
 sitrep_server <- function(url, what, fix) {
   if (!is_server_address(url)) {
@@ -187,39 +177,23 @@ sitrep_server <- function(url, what, fix) {
 
 #' @export
 print.gym_sitrep <- function(x, ...) {
-  for (topic in unique(x$topic)) {
-    cat(cli::style_bold(topic), "\n", sep = "")
-    cat(sitrep_lines(x[x$topic == topic, ]), sep = "\n")
-  }
+  fix <- ifelse(is.na(x$fix), "", paste0(" ", cli::symbol$arrow_right, " ", x$fix))
+  text <- shown_text(paste0(x$what, ": ", x$finding, fix))
+  home <- path.expand("~")
+  if (nchar(home) > 1L) text <- gsub(paste0(home, "/"), "~/", text, fixed = TRUE)
+  text <- gsub("[[:space:]]*\n[[:space:]]*", " ", text)
+  lines <- paste(vapply(x$state, sitrep_mark, ""), text)
+  for (topic in unique(x$topic)) cat(cli::style_bold(topic), lines[x$topic == topic], sep = "\n")
   wrong <- sum(x$state == "wrong")
-  cat(
-    if (wrong) {
-      paste0(count_of(wrong, "thing"), if (wrong == 1) " is" else " are", " wrong, marked ",
-             sitrep_mark("wrong"), ".")
-    } else {
-      "Nothing is wrong."
-    },
-    "\n", sep = ""
-  )
+  are <- paste(count_of(wrong, "thing"), if (wrong == 1) "is" else "are")
+  cat(if (wrong) paste0(are, " wrong, marked ", sitrep_mark("wrong"), ".") else "Nothing is wrong.",
+      "\n", sep = "")
   invisible(x)
-}
-
-sitrep_lines <- function(rows) {
-  fix <- ifelse(is.na(rows$fix), "", paste0(" ", cli::symbol$arrow_right, " ", rows$fix))
-  text <- home_as_tilde(shown_text(paste0(rows$what, ": ", rows$finding, fix)))
-  paste(vapply(rows$state, sitrep_mark, ""), gsub("[[:space:]]*\n[[:space:]]*", " ", text))
 }
 
 sitrep_mark <- function(state) {
   switch(
-    state,
-    ok = cli::col_green(cli::symbol$tick),
-    note = cli::col_cyan(cli::symbol$info),
+    state, ok = cli::col_green(cli::symbol$tick), note = cli::col_cyan(cli::symbol$info),
     wrong = cli::col_red(cli::symbol$cross)
   )
-}
-
-home_as_tilde <- function(text) {
-  home <- path.expand("~")
-  if (nchar(home) > 1L) gsub(paste0(home, "/"), "~/", text, fixed = TRUE) else text
 }

@@ -65,16 +65,20 @@ is_running <- function(base) {
 gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
                              token = is.null(port) && is.null(users), users = NULL) {
   # Evaluate the token first: any later error would show the call with it.
-  check_own_token(token)
+  hide_token(token)
+  if (!rlang::is_bool(token)) {
+    abort_misuse("token", NULL, rlang::current_env(), "`token` must be `TRUE` or `FALSE`.",
+                 i = "Set your own token in a file, by `token_file = `, or in the environment
+                      variable {token_variable}.")
+  }
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
   check_string(users, allow_null = TRUE)
   if (token && !is.null(users)) {
-    gym_abort(
-      "`token = TRUE` and `users` exclude each other: `users` has a token for each user.",
-      class = "gym_error_argument", argument = "token"
-    )
+    abort_misuse("token", NULL, rlang::current_env(),
+                 "`token = TRUE` and `users` exclude each other: `users` has a token for each
+                  user.")
   }
   options <- c(list(...), if (!is.null(users)) list(users = users))
   client <- start_server(port, python, options, timeout, token)
@@ -88,20 +92,6 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
   client
 }
 
-check_own_token <- function(token, call = rlang::caller_env()) {
-  hide_token(token)
-  if (!rlang::is_bool(token)) {
-    gym_abort(
-      c(
-        "`token` must be `TRUE` or `FALSE`.",
-        i = paste0("Set your own token in a file, by `token_file = `, or in the environment ",
-                   "variable ", token_variable, ".")
-      ),
-      class = "gym_error_argument", argument = "token", call = call
-    )
-  }
-}
-
 #' Start a server with the first Python that can run it
 #' @param token Should it require its own token, unless there is another one?
 #' @param install May a Python environment be installed (after a question, or by `GYM_INSTALL`) if
@@ -110,11 +100,8 @@ check_own_token <- function(token, call = rlang::caller_env()) {
 #' @noRd
 start_server <- function(port = NULL, python = NULL, options = list(), timeout = 60, token = TRUE,
                          install = TRUE, call = rlang::caller_env()) {
-  for (name in c("token_file", "users")) {
-    if (rlang::is_string(options[[name]])) {
-      options[[name]] <- path.expand(options[[name]])
-    }
-  }
+  paths <- Filter(rlang::is_string, options[names(options) %in% c("token_file", "users")])
+  options[names(paths)] <- lapply(paths, path.expand)
   arguments <- c(
     "-c", run_server, "--stop-on-stdin-eof", "--port", sprintf("%.0f", port %||% 0),
     server_options(options, call)
@@ -138,7 +125,13 @@ start_server <- function(port = NULL, python = NULL, options = list(), timeout =
 }
 
 register_server <- function(server) {
-  server$extra_hint <- function(extra) installed_extra_hint(extra, server$python)
+  # How to install an extra, if the server runs in the environment of gym_server_install(). It is
+  # NULL for a server with another Python, which somebody else maintains.
+  server$extra_hint <- function(extra) {
+    if (is_installed_python(server$python)) {
+      paste0("`gym_server_install(extras = \"", extra, "\")` installs it, and this server finds it")
+    }
+  }
   server$why_ended <- function() end_reason(server$process, server$log)
   the_session$servers[[server$url]] <- server
   # At the session's end R runs the youngest finalizer first. This one is registered after the
@@ -150,29 +143,19 @@ register_server <- function(server) {
   new_client(server$url, token = server$token)
 }
 
-# How to install an extra, if the server runs in the environment of gym_server_install(). It is NULL
-# for a server with another Python, which somebody else maintains.
-installed_extra_hint <- function(extra, python) {
-  if (is_installed_python(python)) {
-    paste0("`gym_server_install(extras = \"", extra, "\")` installs it, and this server finds it")
-  }
-}
-
 # Options as a command line: monitor_dir = "runs" becomes --monitor-dir runs, TRUE a flag, and a
 # vector one option for each element.
 server_options <- function(options, call = rlang::caller_env()) {
   check_dots_named(options, "monitor_dir = \"runs\"", call = call)
   flags <- paste0("--", gsub("_", "-", names(options)))
-  unlist(Map(
-    function(flag, values) {
-      if (isTRUE(values)) {
-        flag
-      } else if (length(values) && !isFALSE(values)) {
-        as.vector(rbind(flag, option_text(values)))
-      }
-    },
-    flags, options
-  ), use.names = FALSE)
+  texts <- function(flag, values) {
+    if (isTRUE(values)) {
+      flag
+    } else if (length(values) && !isFALSE(values)) {
+      as.vector(rbind(flag, option_text(values)))
+    }
+  }
+  unlist(Map(texts, flags, options), use.names = FALSE)
 }
 
 # Numbers without exponents: 1e5 must be 100000 on a command line.
@@ -225,18 +208,12 @@ gym_server_log <- function(client = NULL) {
 session_server <- function(client, call = rlang::caller_env()) {
   client <- client %||% the_session$client
   if (is.null(client)) {
-    gym_abort(
-      "This session has started no server.", class = "gym_error_argument", call = call
-    )
+    abort_misuse(NULL, NULL, call, "This session has started no server.")
   }
   check_client(client, call = call)
-  the_session$servers[[client$remote_base]] %||% gym_abort(
-    c(
-      paste0("The server at ", client$remote_base, " was not started by this session."),
-      i = "`shutdown_server()` stops any server."
-    ),
-    class = "gym_error_argument",
-    call = call
+  the_session$servers[[client$remote_base]] %||% abort_misuse(
+    NULL, NULL, call, "The server at {client$remote_base} was not started by this session.",
+    i = "`shutdown_server()` stops any server."
   )
 }
 
@@ -255,15 +232,12 @@ end_session <- function(session) {
   servers <- if (Sys.getpid() == session$pid) {
     Filter(function(server) server$process$is_alive(), session$servers)
   }
+  await_ends <- function(until) {
+    for (server in servers) await_end(server$process, until - now())
+  }
   lapply(servers, close_server_input)
   close_session_instances(closing_time / 2)
-  await_ends(servers, deadline - closing_time / 2)
+  await_ends(deadline - closing_time / 2)
   lapply(servers, terminate_server)
-  await_ends(servers, deadline)
-}
-
-await_ends <- function(servers, deadline) {
-  for (server in servers) {
-    await_end(server$process, deadline - now())
-  }
+  await_ends(deadline)
 }

@@ -52,20 +52,16 @@ space_label.gym_space_box <- function(space) paste("Box", space$dtype, shape_tex
 #' @exportS3Method
 space_label.gym_space_multidiscrete <- function(space) {
   n <- prod(space$shape)
-  flat <- length(space$shape) == 1L && n <= 10L
-  all_text <- function(bound) shape_text(rep(bound, length.out = n))
-  if (flat) {
-    from <- if (any(space$start != 0)) paste(" from", all_text(space$start))
-    paste0("MultiDiscrete ", all_text(space$nvec), from)
-  } else {
-    paste("MultiDiscrete of shape", shape_text(space$shape))
+  if (length(space$shape) != 1L || n > 10L) {
+    return(paste("MultiDiscrete of shape", shape_text(space$shape)))
   }
+  all_text <- function(bound) shape_text(rep(bound, length.out = n))
+  from <- if (any(space$start != 0)) paste(" from", all_text(space$start))
+  paste0("MultiDiscrete ", all_text(space$nvec), from)
 }
 
 #' @exportS3Method
-space_label.gym_space_multibinary <- function(space) {
-  paste("MultiBinary", shape_text(space$shape))
-}
+space_label.gym_space_multibinary <- function(space) paste("MultiBinary", shape_text(space$shape))
 
 # The lower and the upper bound of each element, row by row.
 space_bounds <- function(space) UseMethod("space_bounds")
@@ -118,13 +114,8 @@ check_value.gym_space_array <- function(space, value, path, call, bounds = FALSE
     refuse(paste("The value must be", wanted_shape(space$shape)), path)
   }
   flat <- row_major(value)
-  wrong <- wrong_number(space, flat)
-  if (is.null(wrong) && bounds) {
-    wrong <- out_of_bounds(space, flat)
-  }
-  if (!is.null(wrong)) {
-    refuse(wrong$problem, path_index(path, unravel(wrong$at, space$shape)))
-  }
+  wrong <- wrong_number(space, flat) %||% if (bounds) out_of_bounds(space, flat)
+  if (!is.null(wrong)) refuse(wrong$problem, path_index(path, unravel(wrong$at, space$shape)))
 }
 
 wanted_shape <- function(shape) {
@@ -153,11 +144,9 @@ value_shape <- function(value, space) {
 # Finds the first number that does not belong to the space: a missing one, or one with a fraction if
 # they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds refuse.
 wrong_number <- function(space, flat) {
-  if (anyNA(flat)) {
-    missing <- is.na(flat) & !is.nan(flat)
-    if (any(missing)) {
-      return(list(problem = "There is a missing value", at = which(missing)[[1L]]))
-    }
+  missing <- if (anyNA(flat)) is.na(flat) & !is.nan(flat)
+  if (any(missing)) {
+    return(list(problem = "There is a missing value", at = which(missing)[[1L]]))
   }
   if (is.double(flat) && space$dtype %in% integer_dtypes) {
     broken <- !is.finite(flat) | flat != trunc(flat)
@@ -227,13 +216,10 @@ round_to_dtype <- function(x, dtype) {
 
 #' @exportS3Method
 write_value.gym_space_array <- function(space, value) {
-  elements <- number_text_json(space$dtype, row_major(value))
+  flat <- row_major(value)
+  whole <- space$dtype %in% integer_dtypes && !is.integer(flat)
+  elements <- if (whole) whole_text(flat) else json_number(flat)
   if (length(space$shape) == 0L) elements else json_nested(elements, space$shape)
-}
-
-number_text_json <- function(dtype, flat) {
-  whole <- dtype %in% integer_dtypes && !is.integer(flat)
-  if (whole) whole_text(flat) else json_number(flat)
 }
 
 # Drawing ---------------------------------------------------------------------------
@@ -246,12 +232,12 @@ space_sample.gym_space_array <- function(space) {
 
 draw_numbers <- function(dtype, low, high) {
   if (dtype == "bool") {
-    return(stats::runif(length(low)) < (low + high) / 2)
+    stats::runif(length(low)) < (low + high) / 2
+  } else if (dtype %in% integer_dtypes) {
+    draw_whole(low, high)
+  } else {
+    round_to_dtype(draw_between(low, high), dtype)
   }
-  if (dtype %in% integer_dtypes) {
-    return(draw_whole(low, high))
-  }
-  round_to_dtype(draw_between(low, high), dtype)
 }
 
 draw_whole <- function(low, high) {
@@ -279,4 +265,69 @@ draw_between <- function(low, high) {
   values[above & !below] <- high[above & !below] - stats::rexp(sum(above & !below))
   values[!below & !above] <- stats::rnorm(sum(!below & !above))
   pmin(pmax(values, low), high)
+}
+
+# Discrete: one of n consecutive whole numbers -----------------------------------------------
+
+#' @exportS3Method
+init_space.gym_space_discrete <- function(space) {
+  space$n <- whole_from_json(space$n)
+  space$start <- if (is.null(space$start)) 0L else whole_from_json(space$start)
+  space$dtype <- space$dtype %||% "int64"
+  space
+}
+
+#' @exportS3Method
+space_label.gym_space_discrete <- function(space) {
+  from <- if (space$start != 0) paste(" from", whole_text(space$start))
+  paste0("Discrete ", whole_text(space$n), from)
+}
+
+#' @exportS3Method
+space_bounds.gym_space_discrete <- function(space) {
+  start <- as.double(space$start)
+  list(low = start, high = start + (as.double(space$n) - 1))
+}
+
+#' @exportS3Method
+decode_value.gym_space_discrete <- function(space, json) {
+  value <- whole_from_json(json)
+  if (!is_whole(value)) {
+    abort_answer(paste("A value of Discrete is", describe_value(value)))
+  }
+  value
+}
+
+#' @exportS3Method
+check_value.gym_space_discrete <- function(space, value, path, call, bounds = FALSE) {
+  if (is.logical(value)) {
+    # TRUE is 1 in R, as True is in Python.
+    value <- as.integer(value)
+  }
+  if (!is_whole(value)) {
+    abort_space(space, value, "A value of Discrete is one whole number", call, path)
+  }
+  wrong <- if (bounds) out_of_bounds(space, value)
+  if (!is.null(wrong)) {
+    abort_space(space, value, paste("The number is", wrong$outside), call, path)
+  }
+}
+
+# Called in nearly every step: the usual case, the last one, is fast.
+is_whole <- function(value) {
+  length(value) == 1L && is.numeric(value) && !is.object(value) && is.finite(value) &&
+    value == trunc(value)
+}
+
+#' @exportS3Method
+write_value.gym_space_discrete <- function(space, value) sprintf("%.0f", value)
+
+#' @exportS3Method
+space_sample.gym_space_discrete <- function(space) {
+  if (is.integer(space$n) && is.integer(space$start)) {
+    space$start + sample.int(space$n, 1L) - 1L
+  } else {
+    bounds <- space_bounds(space)
+    draw_whole(bounds$low, bounds$high)
+  }
 }

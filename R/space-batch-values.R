@@ -108,24 +108,18 @@ bind_batches <- function(space, each) {
 #' @param values The batch of their replacements.
 #' @noRd
 replace_rows <- function(space, batch, n, i, values) {
-  if (is_stackable(space) && !is.object(batch) && !is.object(values)) {
-    return(put_rows(batch, i, values))
+  if (!is_stackable(space) || is.object(batch) || is.object(values)) {
+    place <- seq_len(n)
+    place[i] <- n + seq_along(i)
+    return(batch_rows(space, bind_batches(space, list(batch, values)), place))
   }
-  place <- seq_len(n)
-  place[i] <- n + seq_along(i)
-  batch_rows(space, bind_batches(space, list(batch, values)), place)
-}
-
-put_rows <- function(batch, i, values) {
   shape <- dim(batch)
   if (is.null(shape)) {
     batch[i] <- values
-  } else if (length(shape) == 2L) {
-    batch[i, ] <- values
   } else {
-    dim(batch) <- c(shape[[1L]], prod(shape[-1L]))
+    if (length(shape) > 2L) dim(batch) <- c(shape[[1L]], prod(shape[-1L]))
     batch[i, ] <- values
-    dim(batch) <- shape
+    if (length(shape) > 2L) dim(batch) <- shape
   }
   batch
 }
@@ -168,9 +162,7 @@ as_batch <- function(space, actions) {
   # For actions of one number each, a vector and a matrix of one column mean the same.
   if (is_stackable(space) && prod(space$shape) == 1 && is.atomic(actions) &&
         length(actions) > 0L && length(actions) == stack_length(actions)) {
-    if (is.logical(actions) && !identical(space$dtype, "bool")) {
-      actions <- as.integer(actions)
-    }
+    if (is.logical(actions) && !identical(space$dtype, "bool")) actions <- as.integer(actions)
     dim(actions) <- if (length(space$shape)) c(length(actions), space$shape)
   }
   actions

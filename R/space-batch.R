@@ -83,9 +83,7 @@ check_value.gym_space_discretes <- function(space, value, path, call, bounds = F
   }
   quick <- !bounds && length(value) == space$shape && is.null(dim(value)) &&
     !is.null(small_integers(value))
-  if (!quick) {
-    check_value.gym_space_array(space, value, path, call, bounds)
-  }
+  if (!quick) check_value.gym_space_array(space, value, path, call, bounds)
 }
 
 # Whole numbers as R's integers, `NULL` if they do not fit or if there is anything else.
@@ -123,7 +121,7 @@ decode_value.gym_space_texts <- function(space, json) {
 
 #' @exportS3Method
 check_value.gym_space_texts <- function(space, value, path, call, bounds = FALSE) {
-  value <- if (is.character(value) && is.null(dim(value))) as.list(value) else value
+  if (is.character(value) && is.null(dim(value))) value <- as.list(value)
   check_value.gym_space_tuple(space, value, path, call, bounds)
 }
 
@@ -166,22 +164,17 @@ check_batch <- function(space, batch, values, n, call, sub_envs = NULL, bounds =
   # A number of an integer64 loses the class.
   if (!is.na(given) && !is_integer64(values)) {
     for (i in seq_len(n)) {
-      sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
-      check_batch_value(space, batch_value(space, values, i), sub_env, call, bounds)
+      tryCatch(
+        check_value(space, batch_value(space, values, i), "", call, bounds),
+        gym_error_space = function(cnd) {
+          cnd$sub_env <- if (is.null(sub_envs)) i else sub_envs[[i]]
+          cnd$message <- paste0("Sub-environment ", cnd$sub_env, ": ", cnd$message)
+          rlang::cnd_signal(cnd)
+        }
+      )
     }
   }
   check_value(batch, values, "", call, bounds)
-}
-
-check_batch_value <- function(space, value, sub_env, call, bounds = FALSE) {
-  tryCatch(
-    check_value(space, value, "", call, bounds),
-    gym_error_space = function(cnd) {
-      cnd$message <- paste0("Sub-environment ", sub_env, ": ", cnd$message)
-      cnd$sub_env <- sub_env
-      rlang::cnd_signal(cnd)
-    }
-  )
 }
 
 #' Count the values of a batch
@@ -216,9 +209,7 @@ batch_length.gym_space_tuple <- function(space, values) {
   if (!is.list(values) || length(values) != length(keys)) {
     return(NA_integer_)
   }
-  if (is.character(keys)) {
-    values <- values[match(keys, enc2utf8(as.character(names(values))))]
-  }
+  if (is.character(keys)) values <- values[match(keys, enc2utf8(as.character(names(values))))]
   counts <- unique(unlist(Map(batch_length, unname(space$spaces), unname(values))))
   if (length(counts) == 1L) counts else NA_integer_
 }

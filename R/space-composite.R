@@ -77,7 +77,15 @@ check_value.gym_space_dict <- function(space, value, path, call, bounds = FALSE)
     abort_space(space, value, "A value of Dict is a list with names", call, path)
   }
   given <- enc2utf8(as.character(names(value)))
-  problem <- key_problem(keys, given)
+  missing <- setdiff(keys, given)
+  strange <- setdiff(given, keys)
+  problem <- if (length(missing)) {
+    paste0("The value has no element named \"", missing[[1L]], "\"")
+  } else if (length(strange)) {
+    paste0("The value has an element named \"", strange[[1L]], "\", which the space does not have")
+  } else if (anyDuplicated(given)) {
+    paste0("The value has two elements named \"", given[anyDuplicated(given)], "\"")
+  }
   if (!is.null(problem)) {
     abort_space(space, value, problem, call, path)
   }
@@ -87,29 +95,11 @@ check_value.gym_space_dict <- function(space, value, path, call, bounds = FALSE)
   }
 }
 
-key_problem <- function(keys, given) {
-  missing <- setdiff(keys, given)
-  strange <- setdiff(given, keys)
-  if (length(missing)) {
-    paste0("The value has no element named \"", missing[[1L]], "\"")
-  } else if (length(strange)) {
-    paste0("The value has an element named \"", strange[[1L]], "\", which the space does not have")
-  } else if (anyDuplicated(given)) {
-    paste0("The value has two elements named \"", given[anyDuplicated(given)], "\"")
-  }
-}
-
 #' @exportS3Method
 write_value.gym_space_dict <- function(space, value) {
-  keys <- names(space$spaces)
-  if (!length(keys)) {
-    return("{}")
-  }
-  ordered <- unname(in_order(space, value))
-  paste0(
-    "{", paste0(json_string(keys), ":", mapply(write_value, space$spaces, ordered),
-                collapse = ","), "}"
-  )
+  parts <- mapply(write_value, space$spaces, unname(in_order(space, value)))
+  keys <- json_string(names(space$spaces))
+  paste0("{", paste0(keys, ":", parts, recycle0 = TRUE, collapse = ","), "}")
 }
 
 #' @exportS3Method

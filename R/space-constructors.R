@@ -61,17 +61,17 @@ space_box <- function(low, high, shape = NULL, dtype = "float64") {
   check_choice(dtype, c("float64", "float32", "float16", integer_dtypes, "bool"))
   check_bound(low, dtype)
   check_bound(high, dtype)
-  if (is.null(shape)) {
-    shape <- array_shape(if (is_single(low)) high else low)
-  }
+  if (is.null(shape)) shape <- array_shape(if (is_single(low)) high else low)
   check_shape(shape)
   shape <- as.integer(shape)
   low_values <- spread_bound(low, shape, dtype)
   high_values <- spread_bound(high, shape, dtype)
-  check_bounds_order(low_values, high_values)
-  space <- make_space(
-    "Box", shape = shape, dtype = dtype, low = low_values, high = high_values
-  )
+  crossed <- which(low_values > high_values)[1L]
+  if (!is.na(crossed)) {
+    must <- paste0("at most `high`, which is ", high_values[[crossed]])
+    abort_argument(low_values[[crossed]], must, "low", rlang::current_env())
+  }
+  space <- make_space("Box", shape = shape, dtype = dtype, low = low_values, high = high_values)
   space$names <- names_of_numbers(low, high, shape)
   space
 }
@@ -125,10 +125,9 @@ space_text <- function(max_length, min_length = 1, characters = c(letters, LETTE
 space_tuple <- function(...) {
   spaces <- list(...)
   if (!is.null(names(spaces))) {
-    gym_abort(
-      "The spaces of a Tuple have no names: `space_dict()` makes a space of spaces with names.",
-      class = "gym_error_argument", argument = "...", value = spaces
-    )
+    abort_misuse("...", spaces, rlang::current_env(),
+                 "The spaces of a Tuple have no names: `space_dict()` makes a space of spaces with
+                  names.")
   }
   check_spaces(spaces)
   make_space("Tuple", dtype = NULL, spaces = spaces)
@@ -149,31 +148,16 @@ make_space <- function(kind, ...) structure(list(name = kind, ...), class = spac
 # Bounds ----------------------------------------------------------------------------
 
 check_bound <- function(x, dtype, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (!are_bounds(x)) {
+  is_numbers <- typeof(x) %in% c("double", "integer", "logical") && !is.object(x)
+  if (!is_numbers || !length(x) || anyNA(x)) {
     abort_argument(x, "numbers, none of them missing", arg, call)
   }
   unfit <- !fits_dtype(x, dtype)
   if (any(unfit)) {
     range <- dtype_ranges[[dtype]]
-    must <- if (is.null(range)) {
-      "infinite, or a number that it can hold"
-    } else {
-      paste0("a whole number", range_text(range[[1L]], range[[2L]]))
-    }
+    whole <- if (!is.null(range)) paste0("a whole number", range_text(range[[1L]], range[[2L]]))
+    must <- whole %||% "infinite, or a number that it can hold"
     abort_argument(x[unfit][[1L]], paste0(must, " where the dtype is \"", dtype, "\""), arg, call)
-  }
-}
-
-are_bounds <- function(x) {
-  typeof(x) %in% c("double", "integer", "logical") && !is.object(x) && length(x) && !anyNA(x)
-}
-
-fits_dtype <- function(x, dtype) {
-  range <- dtype_ranges[[dtype]]
-  if (is.null(range)) {
-    is.infinite(x) | is.finite(round_to_dtype(x, dtype))
-  } else {
-    x >= range[[1L]] & x <= range[[2L]] & x == trunc(x)
   }
 }
 
@@ -189,14 +173,6 @@ spread_bound <- function(x, shape, dtype, arg = rlang::caller_arg(x), call = rla
     abort_argument(x, must, arg, call)
   }
   round_to_dtype(as.double(row_major(x)), dtype)
-}
-
-check_bounds_order <- function(low, high, call = rlang::caller_env()) {
-  crossed <- low > high
-  if (any(crossed)) {
-    at <- which(crossed)[[1L]]
-    abort_argument(low[[at]], paste0("at most `high`, which is ", high[[at]]), "low", call)
-  }
 }
 
 # The names of the numbers of a space, which its first argument or its second has.
@@ -241,17 +217,12 @@ sorted_characters <- function(x, arg = rlang::caller_arg(x), call = rlang::calle
 }
 
 check_spaces <- function(spaces, call = rlang::caller_env()) {
-  for (i in seq_along(spaces)) {
-    check_space(spaces[[i]], names(spaces)[i] %||% paste0("..", i), call)
-  }
+  for (i in seq_along(spaces)) check_space(spaces[[i]], names(spaces)[i] %||% paste0("..", i), call)
 }
 
 check_space <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (!inherits(x, "gym_space")) {
-    gym_abort(
-      c(paste0("`", arg, "` must be a space, not ", describe_argument(x), "."),
-        i = "`space_box()`, `space_discrete()` and others make one."),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
+    abort_misuse(arg, x, call, "`{arg}` must be a space, not {describe_argument(x)}.",
+                 i = "`space_box()`, `space_discrete()` and others make one.")
   }
 }

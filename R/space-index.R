@@ -21,10 +21,7 @@ space_index.gym_space_discrete <- function(space) {
 
 # The distance of whole numbers from the first of `n`; NA for others.
 beyond_start <- function(x, start, n) {
-  if (!is.numeric(x) && !is.logical(x)) {
-    return(rep(NA, length(x)))
-  }
-  beyond <- x - start
+  beyond <- if (is.numeric(x) || is.logical(x)) x - start else rep(NA, length(x))
   beyond[is.na(beyond) | beyond < 0 | beyond >= n | beyond != trunc(beyond)] <- NA
   beyond
 }
@@ -89,11 +86,9 @@ rows_of_table <- function(index, space, observation, n, call) {
   row <- index$index(observation, n)
   if (anyNA(row)) {
     wrong <- batch_value(space, observation, which(is.na(row))[[1L]])
-    gym_abort(
-      c(paste0("The table has no row for the observation ", describe_value(wrong), "."),
-        i = paste0("It has one for each value of ", format(space), ".")),
-      class = "gym_error_argument", argument = "observation", value = observation, call = call
-    )
+    abort_misuse("observation", observation, call,
+                 "The table has no row for the observation {describe_value(wrong)}.",
+                 i = "It has one for each value of {format(space)}.")
   }
   row
 }
@@ -110,10 +105,10 @@ all_values <- function(space) {
     return(space$values)
   }
   columns <- digit_values(space)
-  if (inherits(space, "gym_space_discrete")) {
-    names(columns) <- "state"
+  names(columns) <- if (inherits(space, "gym_space_discrete")) {
+    "state"
   } else {
-    names(columns) <- space$names %||% names(space$spaces) %||% paste0("obs_", seq_along(columns))
+    space$names %||% names(space$spaces) %||% part_columns("obs", seq_along(columns))
   }
   # The last one changes first.
   rev(do.call(expand.grid, c(rev(columns), KEEP.OUT.ATTRS = FALSE)))
@@ -156,22 +151,16 @@ values_batch <- function(space, columns) {
 table_index <- function(space, what, call) {
   index <- space_index(space)
   if (is.null(index)) {
-    gym_abort(
-      c(paste0("A table needs ", what, " that can be counted, but ", format(space), " cannot."),
-        i = paste("Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these."),
-        i = "For observations in a Box use a network or features."),
-      class = "gym_error_argument", value = space, call = call
-    )
+    abort_misuse(NULL, space, call,
+                 "A table needs {what} that can be counted, but {format(space)} cannot.",
+                 i = "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these.",
+                 i = "For observations in a Box use a network or features.")
   }
   if (index$count > most_values) {
-    gym_abort(
-      c(paste0("A table for ", format(space), " would have ",
-               whole_number_text(index$count),
-               " rows; at most ", whole_number_text(most_values),
-               " are possible."),
-        i = "With `features`, such as `tile_coding()`, observations share a value."),
-      class = "gym_error_argument", value = space, call = call
-    )
+    abort_misuse(NULL, space, call,
+                 "A table for {format(space)} would have {whole_number_text(index$count)} rows; at
+                  most {whole_number_text(most_values)} are possible.",
+                 i = "With `features`, such as `tile_coding()`, observations share a value.")
   }
   index
 }

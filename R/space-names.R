@@ -14,7 +14,15 @@ naming <- function(space, batch = FALSE) {
   labels <- space$names
   if (has_parts(space)) {
     parts <- lapply(unname(space$spaces), naming, batch)
-    naming_of_parts(parts, if (inherits(space, "gym_space_tuple")) labels)
+    if (!inherits(space, "gym_space_tuple")) labels <- NULL
+    named <- which(!vapply(parts, is.null, NA))
+    if (length(named) || !is.null(labels)) {
+      function(value) {
+        for (i in named) value[[i]] <- parts[[i]](value[[i]])
+        if (!is.null(labels)) names(value) <- labels
+        value
+      }
+    }
   } else if (is.null(labels) || !inherits(space, "gym_space_array")) {
     # A single number has none: it would be printed with its name at each step.
     NULL
@@ -38,20 +46,6 @@ named_batch <- function(space, batch) {
   if (is.null(name)) batch else name(batch)
 }
 
-naming_of_parts <- function(parts, labels) {
-  named <- which(!vapply(parts, is.null, NA))
-  if (!length(named) && is.null(labels)) {
-    return(NULL)
-  }
-  function(value) {
-    for (i in named) {
-      value[[i]] <- parts[[i]](value[[i]])
-    }
-    if (!is.null(labels)) names(value) <- labels
-    value
-  }
-}
-
 # Columns of tables -----------------------------------------------------------------------
 
 #' Put observations into columns
@@ -66,12 +60,10 @@ observation_columns <- function(space, values) {
     return(as.list(decoded_values(space, values)))
   }
   columns <- value_columns(space, values, "obs")
-  names(columns) <- if (is_stackable(space)) {
-    number_names(space, length(columns))
+  if (is_stackable(space)) {
+    names(columns) <- number_names(space, length(columns))
   } else if (!is.null(space$names)) {
-    beside_steps(sub("^obs_", "", names(columns)))
-  } else {
-    names(columns)
+    names(columns) <- beside_steps(sub("^obs_", "", names(columns)))
   }
   columns
 }
@@ -80,11 +72,7 @@ observation_columns <- function(space, values) {
 #' @param space The observation space, `NULL` if it is unknown.
 #' @noRd
 number_names <- function(space, n = prod(space$shape)) {
-  if (is.null(space$names)) {
-    paste0("obs_", seq_len(n), recycle0 = TRUE)
-  } else {
-    beside_steps(space$names)
-  }
+  if (is.null(space$names)) part_columns("obs", seq_len(n)) else beside_steps(space$names)
 }
 
 # A name that another column of the table of steps has, or may have, gets the prefix `obs_`.
@@ -136,3 +124,67 @@ value_columns.gym_space_tuple <- function(space, values, name) {
 
 #' @exportS3Method
 value_columns.gym_space_dict <- value_columns.gym_space_tuple
+
+# Labels ----------------------------------------------------------------------------------
+
+# A Discrete space may have an element `values`: a data frame with a row for each of its numbers,
+# the name of a state (in several columns, perhaps) or of an action. Numbers play; people see the
+# names.
+
+#' Make a Discrete space whose numbers stand for values
+#' @param values A data frame with a row for each value.
+#' @noRd
+labelled_space <- function(values) {
+  space <- space_discrete(max(nrow(values), 1L))
+  space$values <- values
+  space
+}
+
+# A text for each number of a Discrete space.
+value_labels <- function(space) {
+  if (is.null(space$values)) as.character(state_numbers(space)) else row_texts(space$values)
+}
+
+# A text for each row of a data frame.
+row_texts <- function(rows, sep = ", ") {
+  do.call(paste, c(unname(lapply(rows, as.character)), sep = sep))
+}
+
+# The values of these numbers: a data frame of the columns of states.
+decoded_values <- function(space, numbers) {
+  values <- space$values[numbers - space$start + 1L, , drop = FALSE]
+  row.names(values) <- NULL
+  values
+}
+
+# The same, as a vector if there is one column. Without names they are the numbers.
+named_numbers <- function(space, numbers) {
+  if (is.null(space$values)) {
+    return(numbers)
+  }
+  values <- decoded_values(space, numbers)
+  if (length(values) == 1L) values[[1L]] else value_labels(space)[numbers - space$start + 1L]
+}
+
+#' Return the numbers of some values
+#' @param x A vector of values or their labels, or a data frame with the columns of the values.
+#' @param what What they are, for the error, such as `"state"`.
+#' @noRd
+encoded_values <- function(space, x, what, call) {
+  if (is.null(space$values)) {
+    return(if (is.factor(x)) as.integer(as.character(x)) else as.integer(x))
+  }
+  if (is.data.frame(x)) {
+    check_columns(x, names(space$values), what, call)
+    x <- row_texts(as.data.frame(x)[names(space$values)])
+  }
+  place <- match(as.character(x), value_labels(space))
+  if (anyNA(place)) {
+    abort_misuse(
+      NULL, x, call, "There is no {what} {describe_value(as.character(x)[is.na(place)][[1L]])}.",
+      i = did_you_mean(as.character(x)[is.na(place)][[1L]], value_labels(space), "\"%s\""),
+      i = "There are {few_names(value_labels(space))}."
+    )
+  }
+  as.integer(space$start) + place - 1L
+}

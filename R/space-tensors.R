@@ -41,15 +41,6 @@ part_names <- function(space, name) {
   paste0(name, "/", keys, recycle0 = TRUE)
 }
 
-part_paths <- function(space, path) {
-  keys <- names(space$spaces)
-  if (is.null(keys)) {
-    lapply(seq_along(space$spaces) - 1L, function(i) path_index(path, i))
-  } else {
-    lapply(keys, function(key) path_key(path, key))
-  }
-}
-
 #' Read a value from an answer's tensors
 #' @param answer A list of `tensors` and `texts`, named lists.
 #' @noRd
@@ -106,9 +97,15 @@ to_tensors.gym_space_text <- function(space, value, name, call, path = "") {
 
 #' @exportS3Method
 to_tensors.gym_space_tuple <- function(space, value, name, call, path = "") {
+  keys <- names(space$spaces)
+  paths <- if (is.null(keys)) {
+    lapply(seq_along(space$spaces) - 1L, path_index, path = path)
+  } else {
+    lapply(keys, path_key, path = path)
+  }
   parts <- Map(
     to_tensors, unname(space$spaces), unname(in_order(space, value)), part_names(space, name),
-    list(call), part_paths(space, path)
+    list(call), paths
   )
   as.list(do.call(c, unname(parts)))
 }
@@ -117,20 +114,13 @@ to_tensors.gym_space_tuple <- function(space, value, name, call, path = "") {
 to_tensors.gym_space_dict <- to_tensors.gym_space_tuple
 
 tensor_dtypes <- c(
-  float64 = "F64", float32 = "F32", float16 = "F16", bool = "BOOL",
-  int8 = "I8", int16 = "I16", int32 = "I32", int64 = "I64",
-  uint8 = "U8", uint16 = "U16", uint32 = "U32", uint64 = "U64"
+  float64 = "F64", float32 = "F32", float16 = "F16", bool = "BOOL", int8 = "I8", int16 = "I16",
+  int32 = "I32", int64 = "I64", uint8 = "U8", uint16 = "U16", uint32 = "U32", uint64 = "U64"
 )
 
 # Refuses a number that the dtype cannot hold: in bytes it would silently wrap around or overflow.
 check_dtype <- function(space, flat, value, call, path = "") {
-  numbers <- as.double(flat)
-  lost <- if (space$dtype %in% names(dtype_ranges)) {
-    range <- dtype_ranges[[space$dtype]]
-    numbers < range[[1L]] | numbers > range[[2L]]
-  } else {
-    is.finite(numbers) & !is.finite(round_to_dtype(numbers, space$dtype))
-  }
+  lost <- !fits_dtype(as.double(flat), space$dtype)
   if (any(lost)) {
     at <- path_index(path, unravel(which(lost)[[1L]], space$shape))
     problem <- paste("There is a number that", space$dtype, "cannot represent")
@@ -143,3 +133,12 @@ dtype_ranges <- list(
   int64 = c(-2^63, 2^63), uint8 = c(0, 2^8 - 1), uint16 = c(0, 2^16 - 1),
   uint32 = c(0, 2^32 - 1), uint64 = c(0, 2^64), bool = c(0, 1)
 )
+
+fits_dtype <- function(x, dtype) {
+  range <- dtype_ranges[[dtype]]
+  if (is.null(range)) {
+    !is.finite(x) | is.finite(round_to_dtype(x, dtype))
+  } else {
+    x >= range[[1L]] & x <= range[[2L]] & x == trunc(x)
+  }
+}

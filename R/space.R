@@ -20,25 +20,20 @@ init_space <- function(space) UseMethod("init_space")
 
 #' @exportS3Method
 init_space.default <- function(space) {
-  gym_abort(
-    paste0("This version of gym does not know the space '", space$name, "'."),
-    class = "gym_error_space"
-  )
+  gym_abort(paste0("This version of gym does not know the space '", space$name, "'."),
+            class = "gym_error_space")
 }
 
 # As Gymnasium writes them. `$` is fast, because every step reads elements of spaces.
 #' @export
 `$.gym_space` <- function(x, name) {
   element <- .subset2(x, name)
-  if (is.null(element)) {
-    switch(
-      name,
-      sample = function() space_sample(x),
-      contains = function(value) space_contains(x, value)
-    )
-  } else {
-    element
+  if (!is.null(element)) {
+    return(element)
   }
+  switch(
+    name, sample = function() space_sample(x), contains = function(value) space_contains(x, value)
+  )
 }
 
 # In words ------------------------------------------------------------------------
@@ -49,9 +44,7 @@ space_label <- function(space) UseMethod("space_label")
 #' @export
 format.gym_space <- function(x, ..., width = 100L) {
   text <- shown_line(space_label(x), .Machine$integer.max)
-  if (nchar(text) > width) {
-    text <- paste0(substr(text, 1L, width - 3L), "...")
-  }
+  if (nchar(text) > width) text <- paste0(substr(text, 1L, width - 3L), "...")
   paste0("<", text, ">")
 }
 
@@ -146,9 +139,7 @@ write_value <- function(space, value) UseMethod("write_value")
 space_sample <- function(space) UseMethod("space_sample")
 
 #' @export
-space_sample.default <- function(space) {
-  check_space(space, call = rlang::caller_env())
-}
+space_sample.default <- function(space) check_space(space, call = rlang::caller_env())
 
 #' @rdname space_sample
 #' @export

@@ -4,34 +4,21 @@
 # R's own error for a missing argument names a function that the user has not called.
 check_given <- function(x, hint = NULL, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (missing(x)) {
-    gym_abort(
-      c(paste0("`", arg, "` is missing."), i = hint), class = "gym_error_argument", argument = arg,
-      call = call
-    )
+    abort_misuse(arg, NULL, call, "`{arg}` is missing.", i = hint)
   }
 }
 
 check_count <- function(x, min = 1, max = .Machine$integer.max, allow_null = FALSE,
                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (allow_null && is.null(x)) {
-    return(invisible(x))
-  }
-  whole <- is_number(x) && x == trunc(x)
-  if (!whole || x < min || x > max) {
-    must <- paste0("a whole number", range_text(min, max), if (allow_null) " or NULL")
-    abort_argument(x, must, arg, call)
-  }
-  invisible(x)
+  check_number(x, min, max, allow_null, arg, call, whole = TRUE)
 }
 
-check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE,
-                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (allow_null && is.null(x)) {
-    return(invisible(x))
-  }
-  if (!is_number(x) || x < min || x > max) {
-    must <- paste0("a number", range_text(min, max), if (allow_null) " or NULL")
-    abort_argument(x, must, arg, call)
+check_number <- function(x, min = -Inf, max = Inf, allow_null = FALSE, arg = rlang::caller_arg(x),
+                         call = rlang::caller_env(), whole = FALSE) {
+  fits <- is_number(x) && (!whole || x == trunc(x)) && x >= min && x <= max
+  if (!fits && !(allow_null && is.null(x))) {
+    must <- paste0(if (whole) "a whole number" else "a number", range_text(min, max))
+    abort_argument(x, paste0(must, if (allow_null) " or NULL"), arg, call)
   }
   invisible(x)
 }
@@ -53,25 +40,19 @@ check_seed <- function(x, min = -.Machine$integer.max, arg = rlang::caller_arg(x
                        call = rlang::caller_env()) {
   # Mention the largest one only if it is exceeded.
   max <- if (is_number(x) && x > largest_seed) largest_seed else Inf
-  check_count(x, min = min, max = max, allow_null = TRUE, arg = arg, call = call)
-  invisible(x)
+  check_count(x, min, max, allow_null = TRUE, arg = arg, call = call)
 }
 
 check_seeds <- function(seeds, call = rlang::caller_env()) {
   if (!is.numeric(seeds) || is_integer64(seeds) || !length(seeds)) {
     abort_argument(seeds, "one or more whole numbers", "seeds", call)
   }
-  for (i in seq_along(seeds)) {
-    check_seed(seeds[[i]], arg = paste0("seeds[", i, "]"), call = call)
-  }
+  for (i in seq_along(seeds)) check_seed(seeds[[i]], arg = paste0("seeds[", i, "]"), call = call)
   if (anyDuplicated(seeds)) {
     twice <- seeds[[anyDuplicated(seeds)]]
-    gym_abort(
-      c(paste0("`seeds` must be different, but ", twice,
-               " occurs more than once."),
-        i = "`unique(seeds)` has each of them once."),
-      class = "gym_error_argument", argument = "seeds", value = seeds, call = call
-    )
+    abort_misuse("seeds", seeds, call,
+                 "`seeds` must be different, but {twice} occurs more than once.",
+                 i = "`unique(seeds)` has each of them once.")
   }
 }
 
@@ -84,10 +65,8 @@ check_flag <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()
 
 check_string <- function(x, allow_null = FALSE,
                          arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (allow_null && is.null(x)) {
-    return(invisible(x))
-  }
-  if (!rlang::is_string(x) || is.na(x) || !nzchar(x)) {
+  fits <- rlang::is_string(x) && !is.na(x) && nzchar(x)
+  if (!fits && !(allow_null && is.null(x))) {
     abort_argument(x, paste0("a string", if (allow_null) " or NULL"), arg, call)
   }
   invisible(x)
@@ -111,21 +90,13 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {
-    gym_abort(
-      paste0("`", arg, "` has `", names(x)[[twice]], "` more than once."),
-      class = "gym_error_argument",
-      call = call
-    )
+    abort_misuse(NULL, NULL, call, "`{arg}` has `{names(x)[[twice]]}` more than once.")
   }
 }
 
 check_dots_named <- function(dots, example, call = rlang::caller_env()) {
   if (length(dots) && !rlang::is_named(dots)) {
-    gym_abort(
-      paste0("Further arguments need names, such as `", example, "`."),
-      class = "gym_error_argument",
-      call = call
-    )
+    abort_misuse(NULL, NULL, call, "Further arguments need names, such as `{example}`.")
   }
   check_unique_names(dots, "...", call)
 }
@@ -168,10 +139,7 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
   if (...length()) {
     given <- names(list(...))[[1L]] %||% ""
     name <- if (nzchar(given)) paste0("`", given, "`") else describe_argument(..1)
-    gym_abort(
-      paste0("There is no argument for ", name, " here."),
-      class = "gym_error_argument", argument = "...", value = list(...), call = call
-    )
+    abort_misuse("...", list(...), call, "There is no argument for {name} here.")
   }
 }
 
@@ -179,23 +147,17 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
 #' @noRd
 check_suggested <- function(package, purpose, call = rlang::caller_env()) {
   if (!requireNamespace(package, quietly = TRUE)) {
-    gym_abort(
-      c(paste0("The package ", package, " is required to ", purpose, "."),
-        i = paste0("`install.packages(\"", package, "\")` installs it.")),
-      class = "gym_error_argument", call = call
-    )
+    abort_misuse(NULL, NULL, call, "The package {package} is required to {purpose}.",
+                 i = "`install.packages(\"{package}\")` installs it.")
   }
 }
 
 check_columns <- function(x, needed, arg, call) {
   absent <- setdiff(needed, names(x))
   if (length(absent)) {
-    gym_abort(
-      c(paste0("`", arg, "` has no column ", quoted_names(absent), "."),
-        i = if (length(absent) == 1L) did_you_mean(absent, names(x)),
-        i = if (length(x)) paste0("Its columns are ", few_names(names(x)), ".")),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
+    abort_misuse(arg, x, call, "`{arg}` has no column {quoted_names(absent)}.",
+                 i = if (length(absent) == 1L) did_you_mean(absent, names(x)),
+                 i = if (length(x)) paste0("Its columns are ", few_names(names(x)), "."))
   }
 }
 
@@ -203,11 +165,9 @@ check_column <- function(x, name, must, are_good, arg, call) {
   good <- are_good(x[[name]])
   if (!all(good)) {
     row <- which(!good)[[1L]]
-    gym_abort(
-      paste0("The column `", name, "` of `", arg, "` must have ", must, ", and in row ", row,
-             " it has ", describe_value(x[[name]][[row]]), "."),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
+    abort_misuse(arg, x, call,
+                 "The column `{name}` of `{arg}` must have {must}, and in row {row} it has
+                  {describe_value(x[[name]][[row]])}.")
   }
 }
 
@@ -220,14 +180,8 @@ are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 
 are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
 
 abort_argument <- function(x, must, arg, call, hint = NULL) {
-  gym_abort(
-    c(paste0("`", arg, "` must be ", must, ", not ", describe_argument(x), "."),
-      i = integer64_hint(x), i = hint),
-    class = "gym_error_argument",
-    argument = arg,
-    value = x,
-    call = call
-  )
+  abort_misuse(arg, x, call, "`{arg}` must be {must}, not {describe_argument(x)}.",
+               i = integer64_hint(x), i = hint)
 }
 
 is_number <- function(x) {
@@ -238,19 +192,16 @@ range_text <- function(min, max) {
   # R's largest integer is a limit of the type; do not mention it.
   bounded <- max != .Machine$integer.max && max < Inf
   above <- min > -.Machine$integer.max
-  if (above && bounded) {
-    paste(" from", format(min), "to", format(max, scientific = FALSE))
-  } else if (above) {
-    paste(" of at least", format(min))
-  } else if (bounded) {
-    paste(" of at most", format(max, scientific = FALSE))
-  } else {
-    ""
-  }
+  paste0(
+    if (above) paste(if (bounded) " from" else " of at least", format(min)),
+    if (bounded) paste(if (above) " to" else " of at most", format(max, scientific = FALSE))
+  )
 }
 
 describe_argument <- function(x) {
-  if (is_short(x)) {
+  plain <- if (is.factor(x)) as.character(x) else x
+  is_short <- is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))
+  if (is_short) {
     describe_value(x)
   } else if (is.array(x)) {
     paste0("an array of ", paste(dim(x), collapse = " x "))
@@ -264,10 +215,4 @@ describe_argument <- function(x) {
     kind <- if (is.list(x)) "list" else paste(typeof(x), "vector")
     paste0(if (is.integer(x)) "an " else "a ", kind, " of length ", length(x))
   }
-}
-
-# Can the value itself be shown?
-is_short <- function(x) {
-  plain <- if (is.factor(x)) as.character(x) else x
-  is.null(x) || is.atomic(x) && length(x) <= 5L && is.null(attributes(plain))
 }

@@ -3,9 +3,8 @@
 # Puts elements given row by row (last index fastest) into an array.
 shape_values <- function(values, shape) {
   if (length(shape) <= 1L) {
-    return(values)
-  }
-  if (length(shape) == 2L) {
+    values
+  } else if (length(shape) == 2L) {
     # Takes a third of the time of aperm().
     matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE)
   } else {
@@ -59,4 +58,74 @@ any_best_column <- function(x) {
     column[tied] <- max.col(best * (1 + stats::runif(length(rows))), "first")
   }
   column
+}
+
+# Moments ---------------------------------------------------------------------------------
+
+# Running moments of observations, which normalise a network's inputs: the count, and for each
+# number the mean and the sum of squared deviations from it (`squares`). `scale` is computed from
+# these: 1 / standard deviation.
+#
+# Two sets are merged as in Chan, Golub and LeVeque (1979, "Updating formulae and a pairwise
+# algorithm for computing sample variances").
+
+# A number whose standard deviation is below this becomes 0, as in the code of Mania, Guy and Recht
+# (2018), https://github.com/modestyachts/ARS, ARS/filter.py.
+least_deviation <- 1e-7
+
+no_moments <- function() list(count = 0, mean = NULL, squares = NULL, scale = NULL)
+
+new_moments <- function(count, mean, squares) {
+  # A single observation has no deviation; the authors' code takes the square root of its square.
+  deviation <- if (count > 1) sqrt(squares / (count - 1)) else abs(mean)
+  list(
+    count = as.numeric(count), mean = mean, squares = squares,
+    scale = ifelse(deviation < least_deviation, 0, 1 / deviation)
+  )
+}
+
+#' Compute the moments of observations
+#' @param values A matrix with an observation in each row.
+#' @noRd
+moments_of <- function(values) {
+  n <- nrow(values)
+  mean <- .colMeans(values, n, ncol(values))
+  deviations <- values - rep(mean, each = n)
+  new_moments(n, mean, .colSums(deviations * deviations, n, ncol(values)))
+}
+
+# The order affects the last bits.
+merge_moments <- function(x, y) {
+  if (is.null(x) || x$count == 0) {
+    return(y)
+  }
+  if (is.null(y) || y$count == 0) {
+    return(x)
+  }
+  count <- x$count + y$count
+  apart <- y$mean - x$mean
+  new_moments(
+    count, x$mean + apart * (y$count / count),
+    x$squares + y$squares + apart * apart * (x$count * (y$count / count))
+  )
+}
+
+# Before the first moments are known, returns the observations unchanged. A number that hardly
+# changed in training may be many of its standard deviations away later; `clip` keeps it from
+# outweighing all others. It is NULL in policies saved by versions that did not clip.
+normalized <- function(values, moments, clip) {
+  if (is.null(moments$mean)) {
+    return(values)
+  }
+  n <- nrow(values)
+  values <- (values - rep(moments$mean, each = n)) * rep(moments$scale, each = n)
+  if (isTRUE(clip < Inf)) values[] <- pmin.int(pmax.int(values, -clip), clip)
+  values
+}
+
+reorder_moments <- function(moments, order) {
+  if (is.null(moments$mean)) {
+    return(moments)
+  }
+  new_moments(moments$count, moments$mean[order], moments$squares[order])
 }

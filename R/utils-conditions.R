@@ -1,31 +1,39 @@
 # All errors of the package are made here, so that each has a class.
 
 gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), parent = NULL) {
+  frame <- rlang::current_env()
   rlang::abort(
     # The message may contain text from a server.
     shown_text(message),
     class = c(class, "gym_error"),
     ...,
     call = without_tokens(rlang::error_call(call)),
-    trace = hidden_trace(rlang::current_env()),
+    # NULL if no token is known: rlang then makes the trace itself.
+    trace = if (length(the_session$hidden)) {
+      trace <- rlang::trace_back(bottom = frame)
+      trace$call <- lapply(trace$call, without_tokens)
+      trace
+    },
     parent = parent
   )
 }
 
-#' Abort because of an argument
+#' Raise an error about an argument
 #'
-#' @param argument,value Its name and its value.
-#' @param ... The lines of the message, with the names of bullets. They are templates of
-#'   `cli::format_inline()`, whose `{}` are evaluated where this function is called. A line break is
-#'   a space, and a line without text is left out.
+#' @param arg,value The argument's name, and its value.
+#' @param call The frame of the function that the user has called.
+#' @param ... The message and, named `i` or `x`, its bullets; `NULL` for none. A string written in
+#'   the call is a template, in which `{x}` is the value of R code, as in [cli::pluralize()], and a
+#'   line break is a space. Any other code gives a text that is shown as it is: it may contain
+#'   braces that a user or a server wrote.
 #' @noRd
-abort_wrong <- function(argument, value, call, ..., .envir = rlang::caller_env()) {
-  lines <- gsub("\n *", " ", c(...))
-  lines[] <- vapply(lines, cli::format_inline, "", .envir = .envir, keep_whitespace = TRUE)
-  gym_abort(
-    lines[nzchar(lines)], class = "gym_error_argument", argument = argument, value = value,
-    call = call
-  )
+abort_misuse <- function(arg, value, call, ..., class = "gym_error_argument") {
+  frame <- parent.frame()
+  bullets <- lapply(as.list(substitute(list(...)))[-1L], function(part) {
+    if (!is.character(part)) return(eval(part, frame))
+    as.character(cli::pluralize(gsub("\\s*\n\\s*", " ", part), .envir = frame))
+  })
+  gym_abort(unlist(bullets), class = class, argument = arg, value = value, call = call)
 }
 
 #' Let errors name the call of the function that the user called
@@ -46,12 +54,6 @@ naming_own_call <- function(code, of, call = rlang::caller_env()) {
   withCallingHandlers(code, gym_error = function(cnd) rlang::cnd_signal(rename(cnd)))
 }
 
-# Adds a hint to an error that was raised by a function that does not know the reason.
-with_hint <- function(cnd, hint) {
-  cnd$message <- paste0(cnd$message, "\n", rlang::format_error_bullets(c(i = hint)))
-  cnd
-}
-
 # `path` is the place of the wrong part in the whole value; it is "" for the whole.
 abort_space <- function(space, value, problem, call, path = "") {
   place <- if (nzchar(path)) paste0("At `", if (!startsWith(path, "$")) "$", path, "`: the")
@@ -64,11 +66,7 @@ abort_space <- function(space, value, problem, call, path = "") {
   gym_abort(
     c(paste0(problem, "."), x = paste0(found, " does not fit the space ", format(space), "."),
       i = integer64_hint(value)),
-    class = "gym_error_space",
-    space = space,
-    value = value,
-    path = path,
-    call = call
+    class = "gym_error_space", space = space, value = value, path = path, call = call
   )
 }
 
@@ -90,4 +88,52 @@ describe_value <- function(value) {
 # The classes of a user's error, which an error about it keeps, so that users can catch it by them.
 own_classes <- function(cnd) {
   setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition"))
+}
+
+# Functions that have ended -----------------------------------------------------------------
+# Each stops for one version with an error that names what replaces it.
+
+#' Functions that have ended
+#'
+#' Calling one of these functions, or making an object of a class that inherits from `GymEnv`, is an
+#' error that names what replaces it. The next version does not have them.
+#'
+#' @param ... Not used.
+#' @section Errors: `gym_error_defunct`, whose field `replacement` has the text.
+#' @name gym-defunct
+#' @aliases GymEnv
+#' @export GymEnv
+#' @keywords internal
+NULL
+
+#' @rdname gym-defunct
+#' @export
+search_repeat <- function(...) abort_defunct("use `search_random(seeds = )`")
+
+#' @rdname gym-defunct
+#' @export
+search_landscape <- function(...) {
+  abort_defunct("play `policy_candidates()` with weights around the best ones by `rollout()`")
+}
+
+GymEnv <- R6Class("GymEnv", public = list(
+  initialize = function(...) {
+    abort_defunct("give the methods as functions of `self` to `gym_env()`", "The class GymEnv")
+  }
+))
+
+# The wrappers of environments written in R that a function replaces.
+ended_wrappers <- c(
+  ClipAction = "TransformAction", RescaleAction = "TransformAction",
+  RescaleObservation = "TransformObservation", NormalizeObservation = "TransformObservation",
+  ClipReward = "TransformReward", NormalizeReward = "TransformReward"
+)
+
+# `what`: what has ended, if not the function itself.
+abort_defunct <- function(replacement, what = NULL, call = rlang::caller_env()) {
+  what <- what %||% paste0("`", utils::tail(as.character(rlang::error_call(call)[[1L]]), 1L), "()`")
+  gym_abort(
+    c(paste(what, "has ended."), i = paste0("Instead, ", replacement, ".")),
+    class = "gym_error_defunct", replacement = replacement, call = call
+  )
 }

@@ -60,19 +60,15 @@ whole_from_halves <- function(bytes, n, signed) {
   halves <- readBin(bytes, "integer", 2L * n, size = 4L, endian = "little")
   lower <- halves[2L * seq_len(n) - 1L]
   upper <- halves[2L * seq_len(n)]
-  if (halves_are_narrow(lower, upper, signed)) {
+  # Do all fit R's integers?
+  if (!anyNA(lower) && !anyNA(upper) && all(upper == if (signed) (lower < 0L) * -1L else 0L) &&
+        (signed || all(lower >= 0L))) {
     return(lower)
   }
   numbers <- (if (signed) signed_half(upper) else unsigned_half(upper)) * 2^32 +
     unsigned_half(lower)
   check_exact(numbers)
   numbers
-}
-
-# Whether all numbers fit R's integers.
-halves_are_narrow <- function(lower, upper, signed) {
-  !anyNA(lower) && !anyNA(upper) && all(upper == (lower < 0L) * -1L) &&
-    (signed || all(upper == 0L))
 }
 
 signed_half <- function(half) {

@@ -58,20 +58,17 @@ draw_from <- function(generator, code) {
 keep_random_state <- function(code) {
   state <- globalenv()$.Random.seed
   if (is.null(state)) {
-    # R keeps the kinds elsewhere, too.
+    # A new session has no .Random.seed, and must have none afterwards. Otherwise its first random
+    # number would depend on the seed used here. R keeps the kinds elsewhere, too.
     kinds <- RNGkind()
-    on.exit(forget_random_state(kinds))
+    on.exit({
+      suppressWarnings(RNGkind(kinds[[1L]], kinds[[2L]], kinds[[3L]]))
+      rm(list = intersect(".Random.seed", ls(globalenv(), all.names = TRUE)), envir = globalenv())
+    })
   } else {
     on.exit(assign(".Random.seed", state, envir = globalenv()))
   }
   code
-}
-
-# A new session has no .Random.seed, and must have none afterwards. Otherwise its first random
-# number would depend on the seed used here.
-forget_random_state <- function(kinds) {
-  suppressWarnings(RNGkind(kinds[[1L]], kinds[[2L]], kinds[[3L]]))
-  rm(list = intersect(".Random.seed", ls(globalenv(), all.names = TRUE)), envir = globalenv())
 }
 
 #' Make the streams for all random numbers in play
@@ -97,9 +94,7 @@ take_stream <- function(streams) {
 
 # The streams as a list that can be saved.
 saved_streams <- function(streams) {
-  list(
-    agent = streams$agent$state, seeds = streams$seeds$state, next_stream = streams$next_stream
-  )
+  list(agent = streams$agent$state, seeds = streams$seeds$state, next_stream = streams$next_stream)
 }
 
 restore_streams <- function(saved) {

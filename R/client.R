@@ -59,22 +59,16 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
   token <- as_token(token)
   check_string(remote_base)
   if (!is_server_address(remote_base)) {
-    gym_abort(
-      c(
-        paste0("`remote_base` must be the address of a server, not \"", remote_base, "\"."),
-        i = "An address looks like \"http://127.0.0.1:5000\"."
-      ),
-      class = "gym_error_argument"
-    )
+    abort_misuse(NULL, NULL, rlang::current_env(),
+                 "`remote_base` must be the address of a server, not \"{remote_base}\".",
+                 i = "An address looks like \"http://127.0.0.1:5000\".")
   }
   check_number(timeout, min = 0.001, max = 1e6)
   if (!inherits(config, "request")) {
     must <- "made with httr, such as by httr::add_headers()"
     abort_argument(config, must, "config", rlang::current_env())
   }
-  if (is_default) {
-    token <- known_token(sub("/+$", "", remote_base))
-  }
+  if (is_default) token <- known_token(sub("/+$", "", remote_base))
   client <- new_client(remote_base, timeout, config, token)
   client$state$may_prompt <- TRUE
   client
@@ -130,14 +124,11 @@ request_data <- function(x, route, data, call = rlang::caller_env()) {
 }
 
 query_text <- function(data) {
-  if (!length(data)) {
-    return("")
-  }
   # as.character() is lazy: R formats the numbers only when it reads them.
   values <- with_decimal_point(
     vapply(data, function(value) curl::curl_escape(enc2utf8(as.character(value))), "")
   )
-  paste0("?", paste0(names(data), "=", values, collapse = "&"))
+  if (length(data)) paste0("?", paste0(names(data), "=", values, collapse = "&"))
 }
 
 #' Read a server's answer or raise its error
@@ -163,4 +154,93 @@ parse_server_error_or_raise_for_status <- function(response) {
   response$answer <- tryCatch(parsed_body(response), error = function(cnd) NULL)
   answer <- read_answer(response, response$request$method %||% "Request to")
   if (is.null(answer)) invisible() else answer
+}
+
+# The session's own client, the default of functions with an argument `client`.
+
+#' Use the session's server
+#'
+#' Return the session's client, the default client of other functions. It uses the server at the
+#' address in the environment variable `GYM_SERVER_URL`, with the token in `GYM_SERVER_TOKEN`.
+#' Without that variable, the first call starts a server on this machine, which stops with the
+#' session. This server accepts calls from this session only, by a secret token (see
+#' [gym_server_start()]).
+#'
+#' @inheritSection gym_server_start If there is no Python
+#' @return A client, as returned by [create_GymClient()].
+#' @section Errors: `gym_error_server_start` if no server could be started. `gym_error_install` if
+#'   its Python environment could not be installed.
+#' @export
+#' @examplesIf gym:::can_start_server()
+#' gym_client()
+gym_client <- function() session_client()
+
+# `install` as start_server() takes it.
+session_client <- function(install = TRUE, call = rlang::caller_env()) {
+  url <- Sys.getenv("GYM_SERVER_URL")
+  if (nzchar(url)) {
+    return(named_client(url, call))
+  }
+  if (is.null(the_session$client) || !is_running(the_session$client$remote_base)) {
+    the_session$client <- start_server(install = install, call = call)
+  }
+  the_session$client
+}
+
+# One client for all calls, so that they share a connection.
+named_client <- function(url, call = rlang::caller_env()) {
+  if (!is_server_address(url)) {
+    abort_misuse(NULL, NULL, call,
+                 "The variable GYM_SERVER_URL must be the address of a server, such as
+                  \"http://127.0.0.1:5000\", not \"{url}\".")
+  }
+  # The address may be that of a server of this session.
+  base <- base_of(url)
+  pid <- the_session$servers[[base]]$pid
+  names <- list(url, Sys.getenv(token_variable), pid)
+  if (!identical(the_session$named_by, names)) {
+    the_session$named_client <- new_client(url, token = known_token(base, call))
+    the_session$named_by <- names
+  }
+  the_session$named_client
+}
+
+# Whether the session has a server or can start one without installing anything. For the examples in
+# the help pages.
+can_start_server <- function() {
+  tryCatch(
+    inherits(session_client(install = FALSE), "GymClient"),
+    gym_error_server_start = function(cnd) FALSE
+  )
+}
+
+# Questions to the user --------------------------------------------------------------------
+
+#' Ask whether to start a server if nobody listens at a client's address
+#'
+#' For scripts written for the classic client, whose users started a server on this machine by hand.
+#' The first request of a client asks, see [prompted_server_starts()]. It does not ask in a session
+#' that is not interactive, nor again after a "no" for this address.
+#' @return Whether a server was started.
+#' @noRd
+prompt_for_server <- function(client, call = rlang::caller_env()) {
+  base <- client$remote_base
+  place <- local_place(base)
+  # An address behind a proxy is not on this machine.
+  asks <- rlang::is_interactive() && !base %in% the_session$start_declined && !is.null(place) &&
+    is.null(client$config$options$proxy) && !probe_server(base, timeout = 0.3)$listens
+  if (!asks) {
+    return(FALSE)
+  }
+  if (!ask_yes_no(paste0("No server runs at ", base, ". Start one there?"), TRUE, call = call)) {
+    the_session$start_declined <- c(the_session$start_declined, base)
+    return(FALSE)
+  }
+  # Without a token: the script's client has none.
+  server <- start_server(place$port, options = list(host = place$host), token = FALSE, call = call)
+  # The script may use another name for the same address, such as localhost.
+  the_session$servers[[base]] <- the_session$servers[[server$remote_base]]
+  everybody <- if (is.null(server$token)) ", for any account of this machine"
+  cli::cli_inform(c(v = "The server at {base} is ready{everybody}. It stops with this R session."))
+  TRUE
 }
