@@ -75,7 +75,8 @@ list_episodes <- function(vector_env, history, most) {
     columns$sub_env <- at %% vector_env$num_envs + 1L
     return(columns)
   }
-  within <- if (common) at %% each else at %% (most * each)
+  # The product may be beyond R's integers.
+  within <- if (common) at %% each else at %% (as.numeric(most) * each)
   columns$row <- as.integer(within %% group)
   number <- if (common) within %/% group + 1L else cumsum(columns$row == 0L)
   columns$seed <- draw(max(number))[number]
@@ -186,8 +187,7 @@ play_tasks <- function(play) {
     task <- episodes_task(play, piece)
     begun <- now()
     list(
-      task = task,
-      here = function() play_listed_episodes(play$vector_env, task),
+      task = task, here = function() play_listed_episodes(play$vector_env, task),
       done = function(played) {
         play$size <- min(most, next_size(piece$units, now() - begun, 2))
         first <- piece$first

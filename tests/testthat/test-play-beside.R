@@ -146,6 +146,12 @@ test_that("a request has no more candidates than fit", {
   expect_identical(take_piece(play, 100L)$last, 2L)
 })
 
+test_that("thousands of episodes of a small policy have a seed and a row each", {
+  columns <- list_episodes(described(256L), new_history(1, 3000, new_streams(1)), 1000000L)
+  expect_identical(columns$row, rep_len(0:255, 3000))
+  expect_identical(length(unique(columns$seed)), 12L)
+})
+
 test_that("pieces take as long as wanted, and grow step by step", {
   expect_identical(next_size(10, 1, 0.25), 2L)
   expect_identical(next_size(10, 0.0001, 0.25), 80L)
