@@ -86,10 +86,11 @@ animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, wid
 animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
-  rlang::exec(
-    animate_episode, file, fps, width, every, x$env, x$policy, max_steps = x$max_steps, seed = seed,
-    client = client, !!!x$kwargs, call = rlang::current_env()
-  )
+  # Not exec(), which would start a server for an environment that needs none.
+  rlang::inject(animate_episode(
+    file, fps, width, every, x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client,
+    !!!x$kwargs, call = rlang::current_env()
+  ))
 }
 
 #' @rdname animate
@@ -186,13 +187,10 @@ new_animation <- function(frames, file, fps, width, every, call = rlang::caller_
     }
     unlink(written)
   }
-  structure(
-    list(
-      file = file %||% written, steps = plan$steps, delays = plan$delays, size = size,
-      stills = pick_stills(frames, 8L)
-    ),
-    class = "gym_animation"
-  )
+  structure(class = "gym_animation", list(
+    file = file %||% written, steps = plan$steps, delays = plan$delays, size = size,
+    stills = pick_stills(frames, 8L)
+  ))
 }
 
 #' Plan which frames to show, and for how long

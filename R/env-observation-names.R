@@ -10,9 +10,7 @@ observation_parts <- list(
   ),
   Blackjack = c("player_sum", "dealer_card", "usable_ace"),
   CartPole = c("cart_position", "cart_velocity", "pole_angle", "pole_angular_velocity"),
-  CliffWalking = "position",
-  CliffWalkingSlippery = "position",
-  FrozenLake = "position",
+  CliffWalking = "position", CliffWalkingSlippery = "position", FrozenLake = "position",
   FrozenLake8x8 = "position",
   HalfCheetah = c(
     "tip_z", "tip_angle", "back_thigh_angle", "back_shin_angle", "back_foot_angle",
@@ -35,8 +33,7 @@ observation_parts <- list(
     "x", "y", "x_velocity", "y_velocity", "angle", "angular_velocity",
     "left_leg_contact", "right_leg_contact"
   ),
-  MountainCar = c("position", "velocity"),
-  MountainCarContinuous = c("position", "velocity"),
+  MountainCar = c("position", "velocity"), MountainCarContinuous = c("position", "velocity"),
   Pendulum = c("cos_theta", "sin_theta", "angular_velocity"),
   Reacher = c(
     "cos_theta1", "cos_theta2", "sin_theta1", "sin_theta2", "target_x", "target_y",
@@ -95,10 +92,8 @@ observation_units <- list(
   CartPole = c(
     cart_position = "m", cart_velocity = "m/s", pole_angle = "rad", pole_angular_velocity = "rad/s"
   ),
-  LunarLander = c(angle = "rad"),
-  MountainCar = c(position = "m"),
-  MountainCarContinuous = c(position = "m"),
-  Pendulum = c(angular_velocity = "rad/s")
+  LunarLander = c(angle = "rad"), MountainCar = c(position = "m"),
+  MountainCarContinuous = c(position = "m"), Pendulum = c(angular_velocity = "rad/s")
 )
 observation_units$LunarLanderContinuous <- observation_units$LunarLander
 

@@ -83,7 +83,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
       result <- stack(outs) %||% stack_checked(outs, stepping, lapply(which, number), call)
       if (traits$limit < Inf) result$truncated <- result$truncated | taken >= traits$limit
       ended <- result$terminated | result$truncated
-      for (sub_env in stepping[ended]) sub_env$ended <- TRUE
+      if (any(ended)) for (sub_env in stepping[ended]) sub_env$ended <- TRUE
       result$next_observation <- result$observation
       result
     }

@@ -6,8 +6,7 @@
 transforms <- list(
   TransformReward = c("reward", "observation", "action", "next_observation", "terminated",
                       "truncated"),
-  TransformObservation = "observation",
-  TransformAction = c("action", "observation")
+  TransformObservation = "observation", TransformAction = c("action", "observation")
 )
 
 wrap_transform_reward <- function(traits, func, call) {

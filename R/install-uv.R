@@ -30,10 +30,8 @@ uv_candidates <- function() {
   places <- c(
     # For reticulate, "managed" means its own uv.
     if (nzchar(reticulate) && reticulate != "managed") absolute_path(reticulate),
-    unname(Sys.which("uv")),
-    file.path(home, ".local", "bin", uv_name()),
-    file.path(cache_of("reticulate"), "uv", "bin", uv_name()),
-    pinned_uv()
+    unname(Sys.which("uv")), file.path(home, ".local", "bin", uv_name()),
+    file.path(cache_of("reticulate"), "uv", "bin", uv_name()), pinned_uv()
   )
   unique(places[file.exists(places) & !dir.exists(places)])
 }

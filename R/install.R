@@ -99,9 +99,7 @@ install_question <- function(extras, uv) {
            uv %||% paste(uv_release$version, "(which is downloaded)")),
     sprintf("Size:  at most %.0f MB to download, %.0f MB on the disk", megabytes("download", 55),
             megabytes("disk", 150)),
-    paste("Where:", install_root()),
-    "Install them?",
-    sep = "\n"
+    paste("Where:", install_root()), "Install them?", sep = "\n"
   )
 }
 

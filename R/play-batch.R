@@ -49,8 +49,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = with_memory(policy, at_once), max_steps = max_steps,
     keep_steps = keep_steps, keep_next = keep_next, learner = learner, at_once = at_once,
-    clips = clips_actions(policy),
-    moments = if (keep_moments) no_moments(), noted = list()
+    clips = clips_actions(policy), moments = if (keep_moments) no_moments(), noted = list()
   )
   # If all sub-environments must be reset together, they wait for each other after each episode.
   together <- if (vector_env$one_seed) at_once else n

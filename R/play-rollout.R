@@ -209,21 +209,18 @@ new_rollout <- function(history, policy, vector_env, origin, steps, next_observa
   several <- !is.null(count_candidates(policy))
   episodes <- episodes_table(history$batches, several)
   frames <- unlist(lapply(history$batches, `[[`, "frames"), recursive = FALSE)
-  structure(
-    list(
-      episodes = episodes,
-      steps = if (steps && nrow(episodes)) {
-        steps_table(history$batches, episodes, vector_env, several, next_observation)
-      },
-      frames = if (!is.null(vector_env$frame)) {
-        lapply(frames, new_frames, fps = vector_env$spec$render_fps)
-      },
-      policy = policy, env_id = environment_label(vector_env),
-      num_envs = if (vector_env$one_seed) vector_env$num_envs, seed = origin$seed,
-      interrupted = interrupted, provenance = origin
-    ),
-    class = "gym_rollout"
-  )
+  structure(class = "gym_rollout", list(
+    episodes = episodes,
+    steps = if (steps && nrow(episodes)) {
+      steps_table(history$batches, episodes, vector_env, several, next_observation)
+    },
+    frames = if (!is.null(vector_env$frame)) {
+      lapply(frames, new_frames, fps = vector_env$spec$render_fps)
+    },
+    policy = policy, env_id = environment_label(vector_env),
+    num_envs = if (vector_env$one_seed) vector_env$num_envs, seed = origin$seed,
+    interrupted = interrupted, provenance = origin
+  ))
 }
 
 #' @export
@@ -274,17 +271,14 @@ print.gym_rollout <- function(x, ...) {
 #' summary(rollout("CartPole-v1", policy_random(), episodes = 20, seed = 1))
 summary.gym_rollout <- function(object, ...) {
   episodes <- object$episodes
-  structure(
-    list(
-      env_id = object$env_id, wrappers = object$provenance$wrappers, policy = object$policy,
-      episodes = nrow(episodes), steps = sum(episodes$length),
-      returns = quartiles(episodes$return), lengths = quartiles(episodes$length),
-      mean = mean(episodes$return), se = standard_error(episodes$return),
-      terminated = sum(episodes$terminated), truncated = sum(episodes$truncated),
-      candidates = if (!is.null(episodes$candidate)) evaluate_episodes(episodes, object$policy)
-    ),
-    class = "summary.gym_rollout"
-  )
+  structure(class = "summary.gym_rollout", list(
+    env_id = object$env_id, wrappers = object$provenance$wrappers, policy = object$policy,
+    episodes = nrow(episodes), steps = sum(episodes$length),
+    returns = quartiles(episodes$return), lengths = quartiles(episodes$length),
+    mean = mean(episodes$return), se = standard_error(episodes$return),
+    terminated = sum(episodes$terminated), truncated = sum(episodes$truncated),
+    candidates = if (!is.null(episodes$candidate)) evaluate_episodes(episodes, object$policy)
+  ))
 }
 
 #' @export

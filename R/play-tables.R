@@ -117,21 +117,18 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
   } else {
     "beside the environment"
   }
-  structure(
-    list(
-      gym = as.character(utils::packageVersion("gym")), R = as.character(getRversion()),
-      platform = R.version$platform, system = paste(system[["sysname"]], system[["release"]]),
-      BLAS = extSoftVersion()[["BLAS"]], LAPACK = La_library(),
-      server = c(versions, described[setdiff(names(described), names(versions))]),
-      processor = vector_env$description$processor, way = way,
-      env_id = environment_label(vector_env),
-      kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
-      wrappers = as.character(vector_env$spec$wrappers),
-      num_envs = if (is.null(vector_env$description)) vector_env$num_envs,
-      seed = settings$seed, preset = settings$agent$preset, started = started, elapsed = NA_real_
-    ),
-    class = "gym_provenance"
-  )
+  structure(class = "gym_provenance", list(
+    gym = as.character(utils::packageVersion("gym")), R = as.character(getRversion()),
+    platform = R.version$platform, system = paste(system[["sysname"]], system[["release"]]),
+    BLAS = extSoftVersion()[["BLAS"]], LAPACK = La_library(),
+    server = c(versions, described[setdiff(names(described), names(versions))]),
+    processor = vector_env$description$processor, way = way,
+    env_id = environment_label(vector_env),
+    kwargs = vector_env$spec$kwargs %||% settings$kwargs %||% list(),
+    wrappers = as.character(vector_env$spec$wrappers),
+    num_envs = if (is.null(vector_env$description)) vector_env$num_envs,
+    seed = settings$seed, preset = settings$agent$preset, started = started, elapsed = NA_real_
+  ))
 }
 
 #' @export

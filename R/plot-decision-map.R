@@ -130,15 +130,12 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
   decided <- decide(place, values, action)
   grid <- stats::setNames(points, observed$names[axes])
   grid[[if (decided$kind == "output") "output" else "action"]] <- decided$values
-  structure(
-    list(
-      grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
-      kind = decided$kind, at = held[-axes], path = way, actions = decided$actions,
-      limits = decided$limits, env_id = place$env_id,
-      wrappers = place$wrappers, policy = place$policy
-    ),
-    class = "gym_decision_map"
-  )
+  structure(class = "gym_decision_map", list(
+    grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
+    kind = decided$kind, at = held[-axes], path = way, actions = decided$actions,
+    limits = decided$limits, env_id = place$env_id,
+    wrappers = place$wrappers, policy = place$policy
+  ))
 }
 
 check_limits <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
@@ -239,8 +236,7 @@ print.gym_decision_map <- function(x, ...) {
   of_all <- if (decided < nrow(x$grid)) paste(decided, "of ")
   states <- paste0(of_all, count_of(nrow(x$grid), "state"))
   shows <- switch(
-    x$kind,
-    state = paste("the action in", states),
+    x$kind, state = paste("the action in", states),
     parts = paste0("the action by ", x$x, " and ", x$y, if (length(x$panels)) {
       paste0(", for each ", paste(x$panels, collapse = " and "))
     }, ", ", states),

@@ -57,14 +57,11 @@ new_state_map <- function(place, env, client, call) {
     in_play & has_action(place$policy, seq_along(states)),
     greedy_policy(place$policy), function(rows) states[rows], place
   )
-  structure(
-    list(
-      grid = data.frame(state = states, action = actions), x = "state", kind = "state",
-      observation_space = space, action_space = place$action_space, env_id = place$env_id,
-      wrappers = place$wrappers, policy = place$policy
-    ),
-    class = c("gym_state_map", "gym_decision_map")
-  )
+  structure(class = c("gym_state_map", "gym_decision_map"), list(
+    grid = data.frame(state = states, action = actions), x = "state", kind = "state",
+    observation_space = space, action_space = place$action_space, env_id = place$env_id,
+    wrappers = place$wrappers, policy = place$policy
+  ))
 }
 
 #' Map a policy whose observations have several parts with few values each
@@ -101,16 +98,13 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
     function(rows) named_batch(space, values_batch(space, parts[rows, , drop = FALSE])), place
   )
   if (inherits(place$policy, "gym_policy_table")) grid$value <- row_max(place$policy$q)[rows]
-  structure(
-    list(
-      grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
-      kind = "parts", panels = setdiff(observed$names[-axes], names(at)), at = at,
-      actions = action_names(
-        place$env_id, as.integer(place$action_space$n), place$action_space$start
-      ),
-      action_space = place$action_space, env_id = place$env_id,
-      wrappers = place$wrappers, policy = place$policy
+  structure(class = c("gym_state_map", "gym_decision_map"), list(
+    grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
+    kind = "parts", panels = setdiff(observed$names[-axes], names(at)), at = at,
+    actions = action_names(
+      place$env_id, as.integer(place$action_space$n), place$action_space$start
     ),
-    class = c("gym_state_map", "gym_decision_map")
-  )
+    action_space = place$action_space, env_id = place$env_id,
+    wrappers = place$wrappers, policy = place$policy
+  ))
 }

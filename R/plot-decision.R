@@ -190,20 +190,12 @@ taken_layers <- function(data) {
 # Where the states stand, as solution_plot_data() returns it.
 state_map_data <- function(x, columns, directions, passenger, destination,
                            call = rlang::caller_env()) {
-  check_count(columns, allow_null = TRUE, call = call)
-  cells <- x$grid
-  known <- known_grid(x$env_id %||% "")
-  numbers <- state_numbers(x$action_space)
-  directions <- action_directions(directions, known, value_labels(x$action_space), call)
-  cells$does <- directions[match(cells$action, numbers)]
-  labels <- action_names(x$env_id, length(numbers), numbers[[1L]])
-  cells$ink <- "black"
+  cells <- data.frame(x$grid, ink = "black")
   side <- sqrt(nrow(cells))
-  own <- switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
-  placed <- place_states(cells, known, columns, own, passenger, destination, integer(), call,
-                         x$observation_space$values)
-  c(placed, list(directions = directions, numbers = numbers, labels = labels,
-                 states = x$observation_space))
+  own <- switch(known_grid(x$env_id), CliffWalking = 12L,
+                FrozenLake = if (side == trunc(side)) as.integer(side))
+  walls <- integer()
+  place_states(cells, x$env_id, x, columns, directions, own, passenger, destination, walls, call)
 }
 
 # The parts on the axes are the columns and the rows; `panels` are those of the other parts that

@@ -113,24 +113,33 @@ taxi_stands <- data.frame(
 
 # Which of Gymnasium's grids it is, or "".
 known_grid <- function(id) {
-  found <- names(known_directions)[startsWith(id, names(known_directions))]
+  found <- names(known_directions)[startsWith(id %||% "", names(known_directions))]
   if (length(found)) found else ""
 }
 
-# What actions are called: as it was said, as in the known grid, or by their names or numbers.
-action_directions <- function(directions, known, labels, call) {
-  directions <- directions %||% known_directions[[known]]
-  count <- length(labels)
-  if (!is.null(directions) && (!is.character(directions) || length(directions) != count)) {
-    must <- paste("a string for each of", count_of(count, "action"))
+# Puts states into Taxi's city, or into a grid of so many columns.
+place_states <- function(cells, env_id, spaces, columns, directions, own_columns, passenger,
+                         destination, walls, call) {
+  check_count(columns, allow_null = TRUE, call = call)
+  known <- known_grid(env_id)
+  numbers <- state_numbers(spaces$action_space)
+  # What actions are called: as it was said, as in the known grid, or by their names or numbers.
+  directions <- directions %||% known_directions[[known]] %||% value_labels(spaces$action_space)
+  if (!is.character(directions) || length(directions) != length(numbers)) {
+    must <- paste("a string for each of", count_of(length(numbers), "action"))
     abort_argument(directions, must, "directions", call)
   }
-  directions %||% as.character(labels)
+  cells$does <- directions[match(cells$action, numbers)]
+  c(
+    states_in_grid(cells, known, spaces$observation_space$values, columns, own_columns, passenger,
+                   destination, walls, call),
+    list(directions = directions, numbers = numbers, states = spaces$observation_space,
+         labels = action_names(env_id, length(numbers), numbers[[1L]]))
+  )
 }
 
-# Puts states into Taxi's city, or into a grid of so many columns.
-place_states <- function(cells, known, columns, own_columns, passenger, destination, walls, call,
-                         values = NULL) {
+states_in_grid <- function(cells, known, values, columns, own_columns, passenger, destination,
+                           walls, call) {
   if (length(values) > 1L && is.null(columns)) {
     # The first column of names goes down, the second to the right, and others make panels.
     axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))

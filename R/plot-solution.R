@@ -82,31 +82,29 @@ autoplot.gym_solution <- function(object, ..., type = c("values", "q"), columns 
 #' @noRd
 solution_plot_data <- function(x, columns, directions, passenger, destination, step,
                                call = rlang::caller_env()) {
-  check_count(columns, allow_null = TRUE, call = call)
   check_count(step, max = x$horizon %||% 1, call = call)
   cells <- data.frame(
     state = state_numbers(x$model$observation_space), value = unname(x$values),
     action = if (is.null(x$actions)) NA else as.matrix(x$actions)[, step]
   )
-  numbers <- state_numbers(x$model$action_space)
-  if (inherits(x$policy, "gym_policy_table")) cells$action <- numbers[best_column(x$policy$q)]
+  if (inherits(x$policy, "gym_policy_table")) {
+    cells$action <- state_numbers(x$model$action_space)[best_column(x$policy$q)]
+  }
   cells$action[row_max(x$q) == -Inf] <- NA
-  known <- known_grid(x$model$spec$id)
-  directions <- action_directions(directions, known, value_labels(x$model$action_space), call)
   kinds <- state_kinds(x$model)
   cells$end <- end_kinds(x$model, kinds)
   cells$value[!kinds$reached] <- NA
-  cells$does <- directions[match(cells$action, numbers)]
-  cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
+  id <- x$model$spec$id
   placed <- place_states(
-    cells, known, columns, if (known != "") grid_columns(x$model), passenger, destination,
-    taxi_walls(x$model), call, x$model$observation_space$values
+    cells, id, x$model, columns, directions, if (known_grid(id) != "") grid_columns(x$model),
+    passenger, destination, taxi_walls(x$model), call
   )
-  placed$cells$ink <- ink_on(placed$cells$value)
-  placed$cells$text <- number_texts(placed$cells$value)
-  labels <- action_names(x$model$spec$id, length(numbers), numbers[[1L]])
-  c(placed, list(directions = directions, numbers = numbers, labels = labels,
-            states = x$model$observation_space))
+  cells <- placed$cells
+  cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
+  cells$ink <- ink_on(cells$value)
+  cells$text <- number_texts(cells$value)
+  placed$cells <- cells
+  placed
 }
 
 #' Find the states that episodes go through and those in which they end

@@ -14,8 +14,7 @@ launch_server <- function(python, arguments, timeout, token = NULL, call = rlang
   log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
   process <- start_python(
-    python, arguments, stdin = "|", stdout = "|", stderr = log,
-    token = token,
+    python, arguments, stdin = "|", stdout = "|", stderr = log, token = token,
     # processx or a forked child would kill the server. Instead the session closes the server's
     # standard input; the server then closes its environments and ends.
     cleanup = FALSE
@@ -78,13 +77,11 @@ port_hint <- function(line) {
 server_environment <- function() {
   search_path <- c(system.file("server", package = "gym"), Sys.getenv("PYTHONPATH"))
   c(
-    "current",
-    PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
+    "current", PYTHONPATH = paste(search_path[nzchar(search_path)], collapse = .Platform$path.sep),
     PYTHONUNBUFFERED = "1",
     # R's library may belong to another user; write nothing there.
     PYTHONDONTWRITEBYTECODE = "1",
-    PYTHON_CPU_COUNT = the_session$cores,
-    own_library_path()
+    PYTHON_CPU_COUNT = the_session$cores, own_library_path()
   )
 }
 

@@ -22,8 +22,7 @@
 gym_sitrep <- function() {
   url <- Sys.getenv("GYM_SERVER_URL")
   found <- rbind(
-    sitrep_r(),
-    attempt_rows("Python", "environment", sitrep_environment()),
+    sitrep_r(), attempt_rows("Python", "environment", sitrep_environment()),
     attempt_rows("Python", "uv", finding("Python", "uv", find_uv(timeout = 3) %||%
       "not found, it would be downloaded if needed")),
     attempt_rows("Python", "Pythons", sitrep_pythons(needed = !nzchar(url))),
@@ -70,8 +69,7 @@ sitrep_r <- function() {
     finding("R", "gym", paste0(
       utils::packageVersion("gym"), " on R ", getRversion(), " (", R.version$platform, ")"
     )),
-    finding("R", "packages", toString(versions)),
-    sitrep_blas(),
+    finding("R", "packages", toString(versions)), sitrep_blas(),
     if (length(missing)) {
       finding("R", "suggested packages", paste("not installed:", toString(
         paste0(missing, " (", suggested_packages[missing], ")")

@@ -24,13 +24,9 @@ batch_space.gym_space_array <- function(space, n) {
 
 #' @exportS3Method
 batch_space.gym_space_discrete <- function(space, n) {
-  structure(
-    list(
-      name = "MultiDiscrete", shape = as.integer(n), dtype = space$dtype, nvec = space$n,
-      start = space$start
-    ),
-    class = c("gym_space_discretes", "gym_space_multidiscrete", "gym_space_array", "gym_space")
-  )
+  batch <- list(name = "MultiDiscrete", shape = as.integer(n), dtype = space$dtype,
+                nvec = space$n, start = space$start)
+  structure(batch, class = c("gym_space_discretes", space_class("MultiDiscrete")))
 }
 
 #' @exportS3Method

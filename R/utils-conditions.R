@@ -5,9 +5,7 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
   rlang::abort(
     # The message may contain text from a server.
     shown_text(message),
-    class = c(class, "gym_error"),
-    ...,
-    call = without_tokens(rlang::error_call(call)),
+    class = c(class, "gym_error"), ..., call = without_tokens(rlang::error_call(call)),
     # NULL if no token is known: rlang then makes the trace itself.
     trace = if (length(the_session$hidden)) {
       trace <- rlang::trace_back(bottom = frame)
