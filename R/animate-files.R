@@ -81,7 +81,7 @@ write_mp4 <- function(pngs, file, fps, width = NULL, call) {
     "-i", file.path(folder, "%06d.png"), "-vf", filter, file
   ), timeout = Inf)
   if (!identical(run$status, 0L)) {
-    abort_misuse("file", file, call, "ffmpeg wrote no video.", x = run$stderr)
+    abort_wrong("file", file, call, "ffmpeg wrote no video.", x = run$stderr)
   }
   size
 }

@@ -53,9 +53,9 @@ animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 #' @export
 animate.default <- function(x, file = NULL, fps = NULL, ...) {
   if (is_given_by_id(x) || is_playable(x)) {
-    abort_misuse("x", x, rlang::current_env(),
-                 "`animate()` shows an episode that was played, and `x` is an environment.",
-                 i = "`animate(rollout(env, policy, frames = TRUE))` plays one.")
+    abort_wrong("x", x, rlang::current_env(),
+                "`animate()` shows an episode that was played, and `x` is an environment.",
+                i = "`animate(rollout(env, policy, frames = TRUE))` plays one.")
   }
   abort_argument(x, "a rollout, a search, a training or a policy", "x", rlang::current_env())
 }
@@ -140,9 +140,9 @@ check_animation <- function(file, fps, width, every, call = rlang::caller_env())
   if (!is_mp4(file)) {
     check_suggested("magick", "write a GIF", call)
   } else if (!is_av_there() && is.null(find_ffmpeg())) {
-    abort_misuse("file", file, call,
-                 "Writing an MP4 file requires the package av or the program ffmpeg.",
-                 i = "`install.packages(\"av\")` installs the package; a .gif file needs neither.")
+    abort_wrong("file", file, call,
+                "Writing an MP4 file requires the package av or the program ffmpeg.",
+                i = "`install.packages(\"av\")` installs the package; a .gif file needs neither.")
   }
   if (!is.null(file)) absolute_path(file)
 }
@@ -154,8 +154,8 @@ is_mp4 <- function(file) !is.null(file) && endsWith(tolower(file), ".mp4")
 episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_env()) {
   row <- episode_row(x, episode, candidate, call)
   if (is.null(x$frames)) {
-    abort_misuse("x", x, call, "This rollout was played without frames.",
-                 i = "`rollout(..., frames = TRUE)` keeps them.")
+    abort_wrong("x", x, call, "This rollout was played without frames.",
+                i = "`rollout(..., frames = TRUE)` keeps them.")
   }
   x$frames[[row]]
 }

@@ -59,9 +59,9 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
   token <- as_token(token)
   check_string(remote_base)
   if (!is_server_address(remote_base)) {
-    abort_misuse(NULL, NULL, rlang::current_env(),
-                 "`remote_base` must be the address of a server, not \"{remote_base}\".",
-                 i = "An address looks like \"http://127.0.0.1:5000\".")
+    abort_wrong(NULL, NULL, rlang::current_env(),
+                "`remote_base` must be the address of a server, not \"{remote_base}\".",
+                i = "An address looks like \"http://127.0.0.1:5000\".")
   }
   check_number(timeout, min = 0.001, max = 1e6)
   if (!inherits(config, "request")) {
@@ -190,9 +190,9 @@ session_client <- function(install = TRUE, call = rlang::caller_env()) {
 # One client for all calls, so that they share a connection.
 named_client <- function(url, call = rlang::caller_env()) {
   if (!is_server_address(url)) {
-    abort_misuse(NULL, NULL, call,
-                 "The variable GYM_SERVER_URL must be the address of a server, such as
-                  \"http://127.0.0.1:5000\", not \"{url}\".")
+    abort_wrong(NULL, NULL, call,
+                "The variable GYM_SERVER_URL must be the address of a server, such as
+                 \"http://127.0.0.1:5000\", not \"{url}\".")
   }
   # The address may be that of a server of this session.
   base <- base_of(url)

@@ -140,8 +140,8 @@ as_vector_env.default <- function(x, num_envs = NULL, ..., max_envs = Inf, frame
 # Frames are kept with one sub-environment, which plays one episode after the other.
 check_one_framed <- function(num_envs, frames, call = rlang::caller_env()) {
   if (frames && isTRUE(num_envs > 1)) {
-    abort_misuse("num_envs", num_envs, call, "`num_envs` must be 1 to keep frames, not {num_envs}.",
-                 i = "Leave it out, or leave out `frames = TRUE`.")
+    abort_wrong("num_envs", num_envs, call, "`num_envs` must be 1 to keep frames, not {num_envs}.",
+                i = "Leave it out, or leave out `frames = TRUE`.")
   }
 }
 
@@ -149,10 +149,10 @@ check_made_before <- function(num_envs, arguments, env, call = rlang::caller_env
   given <- c(if (!is.null(num_envs)) "num_envs", names(arguments), if (length(arguments)) "...")
   if (length(given)) {
     near <- did_you_mean(given[[1L]], arguments_of(passed_on_by(given[[1L]])))
-    abort_misuse(given[[1L]], NULL, call,
-                 "`{given[[1L]]}` is for an environment given by its id, but this
-                  {environment_label(env)} was made before.",
-                 i = near %||% "Give its id instead, or pass the argument to `gym_make()`.")
+    abort_wrong(given[[1L]], NULL, call,
+                "`{given[[1L]]}` is for an environment given by its id, but this
+                 {environment_label(env)} was made before.",
+                i = near %||% "Give its id instead, or pass the argument to `gym_make()`.")
   }
 }
 
@@ -250,10 +250,10 @@ counts_to_try <- function(n) {
 
 check_no_workers <- function(num_workers, call) {
   if (isTRUE(num_workers > 0)) {
-    abort_misuse("num_workers", num_workers, call,
-                 "`num_workers = {num_workers}` has no effect on an environment with its own vector
-                  implementation, which plays all sub-environments in one process.",
-                 i = "Leave it out.")
+    abort_wrong("num_workers", num_workers, call,
+                "`num_workers = {num_workers}` has no effect on an environment with its own vector
+                 implementation, which plays all sub-environments in one process.",
+                i = "Leave it out.")
   }
 }
 

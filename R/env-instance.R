@@ -8,9 +8,9 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   env_id <- bare_id(env_id)
   calling_r <- intersect(wrapper_names(wrappers), names(transforms))
   if (length(calling_r)) {
-    abort_misuse("wrappers", calling_r, call,
-                 "{calling_r[[1L]]} calls an R function, which an instance on a server cannot do.",
-                 i = "Use `gym_make()` instead of the classic calls.")
+    abort_wrong("wrappers", calling_r, call,
+                "{calling_r[[1L]]} calls an R function, which an instance on a server cannot do.",
+                i = "Use `gym_make()` instead of the classic calls.")
   }
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)

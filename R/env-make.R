@@ -306,9 +306,9 @@ summary.gym_env <- function(object, ...) object
   member <- .subset2(x, name)
   if (is.null(member) && !exists(name, envir = x, inherits = FALSE)) {
     members <- setdiff(ls(x), c("initialize", "print"))
-    abort_misuse(name, NULL, rlang::current_env(), "An environment has no `${name}`.",
-                 i = did_you_mean(name, members, "`$%s`"),
-                 i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), "."))
+    abort_wrong(name, NULL, rlang::current_env(), "An environment has no `${name}`.",
+                i = did_you_mean(name, members, "`$%s`"),
+                i = paste0("It has ", paste0("`$", members, "`", collapse = ", "), "."))
   }
   member
 }

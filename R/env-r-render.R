@@ -9,8 +9,8 @@ least_width <- 240L
 
 check_renders <- function(sub_env, call = rlang::caller_env()) {
   if (is.null(sub_env$render)) {
-    abort_misuse("render", NULL, call, "{sub_env$traits$spec$id} cannot be drawn.",
-                 i = "Give it a function `render` that draws it, see `?gym_env`.")
+    abort_wrong("render", NULL, call, "{sub_env$traits$spec$id} cannot be drawn.",
+                i = "Give it a function `render` that draws it, see `?gym_env`.")
   }
 }
 
@@ -44,11 +44,11 @@ draw_sub_env <- function(sub_env, call) {
   } else if (grDevices::is.raster(picture) || array) {
     frame_from_picture(picture, sub_env, call)
   } else if (!file.exists(file)) {
-    abort_misuse("render", picture, call,
-                 "`render()` of {sub_env$traits$spec$id} drew nothing and returned
-                  {describe_argument(picture)}.",
-                 i = "It must plot, or return a raster image, a matrix or an array of height x width
-                      x 3.")
+    abort_wrong("render", picture, call,
+                "`render()` of {sub_env$traits$spec$id} drew nothing and returned
+                 {describe_argument(picture)}.",
+                i = "It must plot, or return a raster image, a matrix or an array of height x width
+                     x 3.")
   } else {
     readBin(file, "raw", file.size(file))
   }

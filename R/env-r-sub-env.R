@@ -10,9 +10,9 @@
 reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number = NULL,
                           call = rlang::caller_env()) {
   if (!is.null(options) && !sub_env$takes_options) {
-    abort_misuse("options", options, call,
-                 "`reset()` of {sub_env$traits$spec$id} does not accept options.",
-                 i = "Give it an argument `options` to accept them.")
+    abort_wrong("options", options, call,
+                "`reset()` of {sub_env$traits$spec$id} does not accept options.",
+                i = "Give it an argument `options` to accept them.")
   }
   if (!is.null(seed) || is.null(sub_env$generator)) {
     sub_env$generator <- new_generator(seed %||% draw_seed())
@@ -45,8 +45,8 @@ raw_step <- function(sub_env, action, call) {
 
 check_was_reset <- function(sub_env, call) {
   if (is.na(sub_env$taken)) {
-    abort_misuse("env", NULL, call, "{sub_env$traits$spec$id} has not been reset.",
-                 i = "`env$reset()` starts an episode.")
+    abort_wrong("env", NULL, call, "{sub_env$traits$spec$id} has not been reset.",
+                i = "`env$reset()` starts an episode.")
   }
 }
 

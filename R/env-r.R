@@ -231,10 +231,10 @@ check_takes <- function(f, arguments, arg = rlang::caller_arg(f), call = rlang::
   }
   declared <- formals(args(f))
   if (!"..." %in% names(declared) && length(declared) < length(arguments)) {
-    abort_misuse(arg, f, call,
-                 "`{arg}` must be a function of {named}, and this one has
-                  {count_of(length(declared), 'argument')}.",
-                 i = paste0("It begins with `function(", paste(arguments, collapse = ", "), ")`."))
+    abort_wrong(arg, f, call,
+                "`{arg}` must be a function of {named}, and this one has
+                 {count_of(length(declared), 'argument')}.",
+                i = paste0("It begins with `function(", paste(arguments, collapse = ", "), ")`."))
   }
 }
 
@@ -284,11 +284,11 @@ check_not_shared <- function(values, call = rlang::caller_env()) {
       "new.env()"
     }
     what <- if (is.null(class)) "an environment of R" else paste("an object of class", class)
-    abort_misuse(name, object, call,
-                 "`{shared$path}` is {what}, which all sub-environments would share.",
-                 i = "Let each make its own in `reset`: `if (is.null(self${name})) self${name} <-
-                      {again}`.",
-                 i = "If nothing changes it, the functions can use it without `self`.")
+    abort_wrong(name, object, call,
+                "`{shared$path}` is {what}, which all sub-environments would share.",
+                i = "Let each make its own in `reset`: `if (is.null(self${name})) self${name} <-
+                     {again}`.",
+                i = "If nothing changes it, the functions can use it without `self`.")
   }
 }
 

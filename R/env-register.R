@@ -72,9 +72,9 @@ gym_unregister <- function(id) {
   check_string(id)
   known <- names(the_session$environments)
   if (!id %in% known) {
-    abort_misuse("id", id, rlang::current_env(),
-                 "No environment written in R is registered as \"{id}\".",
-                 i = did_you_mean(id, known, "\"%s\""))
+    abort_wrong("id", id, rlang::current_env(),
+                "No environment written in R is registered as \"{id}\".",
+                i = did_you_mean(id, known, "\"%s\""))
   }
   the_session$environments[[id]] <- NULL
   invisible(id)
@@ -114,10 +114,10 @@ make_registered <- function(id, arguments = list(), call = rlang::caller_env()) 
     env <- with_generator(new_generator(0L), do.call(env, given))
     given <- list()
     if (!is_playable(env)) {
-      abort_misuse("entry_point", env, call,
-                   "The `entry_point` of {bare_id(id)} must return an environment, not
-                    {describe_argument(env)}.",
-                   i = "Make one by `gym_env()`.")
+      abort_wrong("entry_point", env, call,
+                  "The `entry_point` of {bare_id(id)} must return an environment, not
+                   {describe_argument(env)}.",
+                  i = "Make one by `gym_env()`.")
     }
   }
   if (inherits(env, "gym_r_env")) env <- change_r_env(env, changes, given, bare_id(id), call)
@@ -145,8 +145,8 @@ check_parameters <- function(given, definition, id, call = rlang::caller_env()) 
 refuse_argument <- function(strange, known, id, from, call) {
   if (length(strange)) {
     near <- did_you_mean(strange[[1L]], c(known, arguments_of(passed_on_by(strange[[1L]]))))
-    abort_misuse(strange[[1L]], NULL, call, "{id} has no argument `{strange[[1L]]}`.",
-                 i = near %||% paste0("Its arguments are ", from, "."))
+    abort_wrong(strange[[1L]], NULL, call, "{id} has no argument `{strange[[1L]]}`.",
+                i = near %||% paste0("Its arguments are ", from, "."))
   }
 }
 
@@ -160,10 +160,10 @@ make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., ca
   id <- format(id)
   if (!is.null(num_envs)) {
     if (!isTRUE(definition_of(env)$vectorized)) {
-      abort_misuse("num_envs", num_envs, call,
-                   "`num_envs = {num_envs}` needs functions for all sub-environments at once, but
-                    those of {id} are for one.",
-                   i = "`rollout()` and searches play several copies of it, see their `num_envs`.")
+      abort_wrong("num_envs", num_envs, call,
+                  "`num_envs = {num_envs}` needs functions for all sub-environments at once, but
+                   those of {id} are for one.",
+                  i = "`rollout()` and searches play several copies of it, see their `num_envs`.")
     }
     env <- change_r_env(env, list(), list(num_envs = as.integer(num_envs)), id, call)
   }
@@ -178,10 +178,10 @@ make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., ca
 check_for_r <- function(id, servers, call = rlang::caller_env()) {
   given <- names(servers)[lengths(servers) > 0L]
   if (length(given)) {
-    abort_misuse(given[[1L]], servers[[given[[1L]]]], call,
-                 "`{given[[1L]]}` is for an environment on a server, and {format(id)} is written in
-                  R.",
-                 i = "Leave it out.")
+    abort_wrong(given[[1L]], servers[[given[[1L]]]], call,
+                "`{given[[1L]]}` is for an environment on a server, and {format(id)} is written in
+                 R.",
+                i = "Leave it out.")
   }
 }
 
@@ -213,9 +213,9 @@ registered_rows <- function(search = NULL) {
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
     id <- bare_id(env_id)
-    abort_misuse("env_id", env_id, call,
-                 "{id} is an environment written in R, which a server cannot make.",
-                 i = "`gym_make(\"{id}\")` makes it here.")
+    abort_wrong("env_id", env_id, call,
+                "{id} is an environment written in R, which a server cannot make.",
+                i = "`gym_make(\"{id}\")` makes it here.")
   }
 }
 

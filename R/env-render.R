@@ -85,10 +85,10 @@ format.gym_frames <- function(x, ...) {
 check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
-    abort_misuse("env", env, call,
-                 "Only an environment without sub-environments can keep frames, but this {label} has
-                  {count_of(env$num_envs, 'sub-environment')}.",
-                 i = "Make it without `num_envs`, or give its id instead.")
+    abort_wrong("env", env, call,
+                "Only an environment without sub-environments can keep frames, but this {label} has
+                 {count_of(env$num_envs, 'sub-environment')}.",
+                i = "Make it without `num_envs`, or give its id instead.")
   }
   draws <- FALSE
   if (is_server_env(env)) {
@@ -96,8 +96,8 @@ check_draws <- function(env, call) {
     draws <- known_instance(env$client, env$instance_id, call = call)$draws
   }
   if (!draws) {
-    abort_misuse("frames", TRUE, call, "There are no frames to keep: {label} cannot be drawn.",
-                 i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations.")
+    abort_wrong("frames", TRUE, call, "There are no frames to keep: {label} cannot be drawn.",
+                i = "Leave out `frames = TRUE`; `steps = TRUE` keeps the observations.")
   }
 }
 

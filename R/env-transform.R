@@ -273,10 +273,10 @@ asked_parts <- function(wrapper, func, call) {
   }
   if (length(needed) || !length(asked)) {
     problem <- if (length(needed)) paste0("needs `", needed[[1L]], "`") else "has no argument"
-    abort_misuse("func", func, call,
-                 "`func` of {wrapper} must be a function of `{known[[1L]]}`, and this one
-                  {problem}.",
-                 i = "The names of its arguments can be {quoted_names(known)}.")
+    abort_wrong("func", func, call,
+                "`func` of {wrapper} must be a function of `{known[[1L]]}`, and this one
+                 {problem}.",
+                i = "The names of its arguments can be {quoted_names(known)}.")
   }
   stats::setNames(asked, asked)
 }

@@ -32,13 +32,13 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
     single_env(env)
   } else if (identical(env$vectorization_mode, "vector_entry_point")) {
     if (identical(env$autoreset_mode, "Disabled")) {
-      abort_misuse("env", env, call,
-                   "Episodes of different length cannot be played in {environment_label(env)} made
-                    with vectorization_mode \"{env$vectorization_mode}\" and autoreset_mode
-                    \"Disabled\": all of its sub-environments are stepped together, and one that has
-                    ended takes no step.",
-                   i = "Make it with autoreset_mode \"NextStep\", or with vectorization_mode
-                        \"sync\".")
+      abort_wrong("env", env, call,
+                  "Episodes of different length cannot be played in {environment_label(env)} made
+                   with vectorization_mode \"{env$vectorization_mode}\" and autoreset_mode
+                   \"Disabled\": all of its sub-environments are stepped together, and one that has
+                   ended takes no step.",
+                  i = "Make it with autoreset_mode \"NextStep\", or with vectorization_mode
+                       \"sync\".")
     }
     joint_sub_envs(env)
   } else {

@@ -3,11 +3,11 @@
 # Wraps an environment of a server, which stays the same instance.
 wrap_server_env <- function(env, wrapper, arguments, call) {
   if (!wrapper %in% names(transforms)) {
-    abort_misuse("wrapper", wrapper, call,
-                 "Wrappers such as {wrapper} are applied by the server when it makes the
-                  environment, and this one is made.",
-                 i = "`gym_make(gym_wrap(\"{env$spec$id}\", \"{wrapper}\"))` makes one; around one
-                      that is made go {toString(names(transforms))}.")
+    abort_wrong("wrapper", wrapper, call,
+                "Wrappers such as {wrapper} are applied by the server when it makes the
+                 environment, and this one is made.",
+                i = "`gym_make(gym_wrap(\"{env$spec$id}\", \"{wrapper}\"))` makes one; around one
+                     that is made go {toString(names(transforms))}.")
   }
   traits <- new_traits(env$single_observation_space, env$single_action_space, env$spec$id)
   traits$spec <- env$spec
@@ -98,17 +98,17 @@ split_wrappers <- function(wrappers, call) {
   wrong <- Filter(takes_function, wrappers[!in_r])
   if (length(wrong)) {
     name <- wrong[[1L]][[1L]]
-    abort_misuse("wrapper", name, call, "The wrapper {name} does not take an R function.",
-                 i = did_you_mean(name, names(transforms), "%s"),
-                 i = "These do: {toString(names(transforms))}.")
+    abort_wrong("wrapper", name, call, "The wrapper {name} does not take an R function.",
+                i = did_you_mean(name, names(transforms), "%s"),
+                i = "These do: {toString(names(transforms))}.")
   }
   late <- which(!in_r & cumsum(in_r) > 0L)
   if (length(late)) {
     names <- c(wrappers[[late[[1L]]]][[1L]], wrappers[[which(in_r)[[1L]]]][[1L]])
-    abort_misuse("wrapper", names[[1L]], call,
-                 "{names[[1L]]} is applied on the server, inside of {names[[2L]]}, which is applied
-                  in R.",
-                 i = "Write it before {names[[2L]]}.")
+    abort_wrong("wrapper", names[[1L]], call,
+                "{names[[1L]]} is applied on the server, inside of {names[[2L]]}, which is applied
+                 in R.",
+                i = "Write it before {names[[2L]]}.")
   }
   list(server = wrappers[!in_r], r = wrappers[in_r])
 }

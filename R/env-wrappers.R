@@ -234,7 +234,7 @@ check_wrapper_arguments <- function(wrapper, arguments, call) {
   if (length(wrong)) {
     does <- if (length(strange)) "has no argument" else "needs the argument"
     has <- if (length(known)) paste("its arguments are", quoted_names(known)) else "it has none"
-    abort_misuse(wrong[[1L]], NULL, call, "{wrapper} {does} `{wrong[[1L]]}`: {has}.")
+    abort_wrong(wrong[[1L]], NULL, call, "{wrapper} {does} `{wrong[[1L]]}`: {has}.")
   }
 }
 
@@ -246,9 +246,9 @@ check_r_wrapper <- function(wrapper, call) {
     abort_defunct(replacement, paste0("\"", wrapper, "\" around environments written in R"), call)
   }
   if (!wrapper %in% names(r_wrappers)) {
-    abort_misuse("wrapper", wrapper, call,
-                 "There is no wrapper \"{wrapper}\" for environments written in R.",
-                 i = paste0("There are ", paste(names(r_wrappers), collapse = ", "), "."))
+    abort_wrong("wrapper", wrapper, call,
+                "There is no wrapper \"{wrapper}\" for environments written in R.",
+                i = paste0("There are ", paste(names(r_wrappers), collapse = ", "), "."))
   }
 }
 

@@ -16,11 +16,11 @@ check_extras <- function(extras, call = rlang::caller_env()) {
   }
   for (extra in extras) {
     if (system_name() %in% unlist(strsplit(lock_entry(extra, "not for"), ", ", fixed = TRUE))) {
-      abort_misuse(NULL, extra, call, class = "gym_error_install",
-                   "The extra \"{extra}\" cannot be installed on this system ({system_name()}).",
-                   i = "Its packages come ready to run for other systems only.",
-                   i = "A server on another machine can have it: `create_GymClient()` takes that
-                        server's address.")
+      abort_wrong(NULL, extra, call, class = "gym_error_install",
+                  "The extra \"{extra}\" cannot be installed on this system ({system_name()}).",
+                  i = "Its packages come ready to run for other systems only.",
+                  i = "A server on another machine can have it: `create_GymClient()` takes that
+                       server's address.")
     }
   }
 }

@@ -16,10 +16,10 @@ find_uv <- function(call = rlang::caller_env(), timeout = 30) {
   uv <- path.expand(named)
   if (file.exists(uv)) uv <- absolute_path(uv)
   if (!uv_works(uv, timeout)) {
-    abort_misuse(NULL, named, call, class = "gym_error_install",
-                 "The variable GYM_UV names {named}, which is not a usable uv.",
-                 i = "It must be the path of uv {least_uv} or newer.",
-                 i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for.")
+    abort_wrong(NULL, named, call, class = "gym_error_install",
+                "The variable GYM_UV names {named}, which is not a usable uv.",
+                i = "It must be the path of uv {least_uv} or newer.",
+                i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for.")
   }
   uv
 }

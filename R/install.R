@@ -62,10 +62,10 @@ gym_server_install <- function(extras = character(), ..., offline = NULL,
   }
   dir.create(environment_folder(), recursive = TRUE, showWarnings = FALSE)
   if (!dir.exists(environment_folder())) {
-    abort_misuse(NULL, NULL, rlang::current_env(), class = "gym_error_install",
-                 "The folder {environment_folder()} cannot be made.",
-                 i = "Check that you can write there and that the disk is not full.",
-                 i = "The environment variable R_USER_CACHE_DIR sets another place for it.")
+    abort_wrong(NULL, NULL, rlang::current_env(), class = "gym_error_install",
+                "The folder {environment_folder()} cannot be made.",
+                i = "Check that you can write there and that the disk is not full.",
+                i = "The environment variable R_USER_CACHE_DIR sets another place for it.")
   }
   python <- install_environment(wanted, uv %||% fetch_uv(call), call)
   remove_old_folders()

@@ -72,9 +72,9 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
 # If no episode ever ends, playing would never return.
 check_has_end <- function(vector_env, max_steps) {
   if (isTRUE(vector_env$endless) && is.infinite(max_steps)) {
-    abort_misuse("max_steps", NULL, vector_env$call,
-                 "Episodes of {environment_label(vector_env)} never end.",
-                 i = "Give `max_steps`, after which an episode is cut off.")
+    abort_wrong("max_steps", NULL, vector_env$call,
+                "Episodes of {environment_label(vector_env)} never end.",
+                i = "Give `max_steps`, after which an episode is cut off.")
   }
 }
 

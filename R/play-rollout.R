@@ -151,8 +151,8 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_flag(steps)
   check_flag(next_observation)
   if (next_observation && !steps) {
-    abort_misuse("next_observation", TRUE, rlang::current_env(),
-                 "`next_observation = TRUE` needs the steps to be kept.", i = "Add `steps = TRUE`.")
+    abort_wrong("next_observation", TRUE, rlang::current_env(),
+                "`next_observation = TRUE` needs the steps to be kept.", i = "Add `steps = TRUE`.")
   }
   check_flag(frames)
   check_count(num_envs, allow_null = TRUE)

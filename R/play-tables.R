@@ -91,10 +91,10 @@ steps_by_episode <- function(x, arg, call) {
     check_column(x, "step", "whole numbers", are_whole_numbers, arg, call)
     again <- which(duplicated(data.frame(x[["episode"]], step)))
     if (length(again)) {
-      abort_misuse(arg, x, call,
-                   "Row {again[[1L]]} of `{arg}` is another step {step[[again[[1L]]]]} of the same
-                    episode.",
-                   i = "Number the episodes in a column `episode`.")
+      abort_wrong(arg, x, call,
+                  "Row {again[[1L]]} of `{arg}` is another step {step[[again[[1L]]]]} of the same
+                   episode.",
+                  i = "Number the episodes in a column `episode`.")
     }
   }
   x[order(x[["episode"]], step %||% seq_along(episode)), ]

@@ -282,8 +282,8 @@ shares_picture <- function(rows, x, geom) {
 improvement_picture <- function(x) {
   rows <- x$improvement
   if (is.null(rows)) {
-    abort_misuse("type", "improvement", NULL,
-                 "There is one training: none could score higher than another.")
+    abort_wrong("type", "improvement", NULL,
+                "There is one training: none could score higher than another.")
   }
   rows$pair <- paste0(rows$training, " > ", rows$than)
   ggplot2::ggplot(rows, ggplot2::aes(

@@ -6,17 +6,17 @@ mapped_observation <- function(place, call = rlang::caller_env()) {
   space <- place$observation_space
   if (!is.null(space) && !inherits(space, "gym_space_box")) {
     within <- if (!is.null(place$env_id)) paste0("in ", env_text(place), " ")
-    abort_misuse("policy", place$policy, call,
-                 "A decision map shows two numbers of an observation, but observations {within}are
-                  of {format(space)}.",
-                 i = "`act(policy, )` gives the action for each single observation.")
+    abort_wrong("policy", place$policy, call,
+                "A decision map shows two numbers of an observation, but observations {within}are
+                 of {format(space)}.",
+                i = "`act(policy, )` gives the action for each single observation.")
   }
   n <- if (is.null(space)) place$policy$sizes[[1L]] else prod(space$shape)
   if (n < 2) {
-    abort_misuse("policy", place$policy, call,
-                 "A decision map shows two numbers of an observation, but this policy observes only
-                  one.",
-                 i = "`curve()` can draw it: `curve(act(policy, matrix(x)), -1, 1)`.")
+    abort_wrong("policy", place$policy, call,
+                "A decision map shows two numbers of an observation, but this policy observes only
+                 one.",
+                i = "`curve()` can draw it: `curve(act(policy, matrix(x)), -1, 1)`.")
   }
   names <- number_names(space, n)
   family <- environment_family(described_id(place))
@@ -43,13 +43,13 @@ mapped_axes <- function(observed, x, y, call = rlang::caller_env()) {
     return(1:2)
   }
   if (is.null(x) || is.null(y)) {
-    abort_misuse(if (is.null(x)) "x" else "y", NULL, call,
-                 "`x` and `y` must name two parts of the observation.", i = observed_text(observed))
+    abort_wrong(if (is.null(x)) "x" else "y", NULL, call,
+                "`x` and `y` must name two parts of the observation.", i = observed_text(observed))
   }
   axes <- c(axis_place(observed, x, "x", call), axis_place(observed, y, "y", call))
   if (axes[[1L]] == axes[[2L]]) {
-    abort_misuse("y", y, call, "`x` and `y` must be two different parts of the observation.",
-                 i = observed_text(observed))
+    abort_wrong("y", y, call, "`x` and `y` must be two different parts of the observation.",
+                i = observed_text(observed))
   }
   axes
 }
@@ -60,9 +60,9 @@ axis_place <- function(observed, axis, arg, call) {
     return(as.integer(axis))
   }
   if (!rlang::is_string(axis) || !axis %in% observed$names) {
-    abort_misuse(arg, axis, call,
-                 "`{arg}` must be a part of the observation, not {describe_argument(axis)}.",
-                 i = observed_text(observed))
+    abort_wrong(arg, axis, call,
+                "`{arg}` must be a part of the observation, not {describe_argument(axis)}.",
+                i = observed_text(observed))
   }
   match(axis, observed$names)
 }
@@ -84,8 +84,8 @@ held_at <- function(observed, axes, at, call = rlang::caller_env()) {
   strange <- setdiff(names(at), observed$names[-axes])
   if (length(strange)) {
     is <- if (strange[[1L]] %in% observed$names) "on an axis" else "no part of the observation"
-    abort_misuse("at", at, call, "`at` names {strange[[1L]]}, which is {is}.",
-                 i = observed_text(observed))
+    abort_wrong("at", at, call, "`at` names {strange[[1L]]}, which is {is}.",
+                i = observed_text(observed))
   }
   held[names(at)] <- at
   held
@@ -104,8 +104,8 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
   } else if (all(abs(bounds) < 1e6)) {
     bounds
   } else {
-    abort_misuse(arg, NULL, call, "The range of {name} is unknown, because it has no bounds.",
-                 i = "Give it as `{arg}`, or a `path` through it.")
+    abort_wrong(arg, NULL, call, "The range of {name} is unknown, because it has no bounds.",
+                i = "Give it as `{arg}`, or a `path` through it.")
   }
 }
 
@@ -113,9 +113,9 @@ mapped_range <- function(observed, axis, along, arg, call = rlang::caller_env())
 
 play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
   if (is.null(env)) {
-    abort_misuse("env", env, call,
-                 "`path = TRUE` plays an episode, for which the environment is needed.",
-                 i = "Give it as `env`, or the steps of a `rollout(steps = TRUE)` as `path`.")
+    abort_wrong("env", env, call,
+                "`path = TRUE` plays an episode, for which the environment is needed.",
+                i = "Give it as `env`, or the steps of a `rollout(steps = TRUE)` as `path`.")
   }
   naming_own_call(rollout(env, policy, seed = seed, steps = TRUE, client = client), "rollout", call)
 }
@@ -123,8 +123,8 @@ play_path <- function(env, policy, seed, client, call = rlang::caller_env()) {
 path_points <- function(path, names, call = rlang::caller_env()) {
   if (inherits(path, "gym_rollout")) {
     if (!is.data.frame(path$steps)) {
-      abort_misuse("path", path, call, "The rollout has no steps in a table to show as a path.",
-                   i = "`rollout(steps = TRUE)` keeps one.")
+      abort_wrong("path", path, call, "The rollout has no steps in a table to show as a path.",
+                  i = "`rollout(steps = TRUE)` keeps one.")
     }
     path <- path$steps
   }

@@ -90,16 +90,16 @@ decision_map <- function(env = NULL, policy, x = NULL, y = NULL, at = NULL, path
                          xlim = NULL, ylim = NULL, action = 1, size = 101, seed = NULL,
                          client = gym_client()) {
   if (missing(policy) || inherits(env, c("gym_policy", "gym_training")) || is.function(env)) {
-    abort_misuse("policy", NULL, rlang::current_env(),
-                 if (missing(policy)) "`policy` is missing." else "`env` must be an environment.",
-                 i = "The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;
-                      without one it is `decision_map(policy = policy)`.")
+    abort_wrong("policy", NULL, rlang::current_env(),
+                if (missing(policy)) "`policy` is missing." else "`env` must be an environment.",
+                i = "The environment comes first, as in `decision_map(\"CartPole-v1\", policy)`;
+                     without one it is `decision_map(policy = policy)`.")
   }
   policy <- trained_policy(policy)
   check_policy(policy)
   if (inherits(policy, "gym_policy_random")) {
-    abort_misuse("policy", policy, rlang::current_env(),
-                 "There is nothing to map: a random policy ignores the observation.")
+    abort_wrong("policy", policy, rlang::current_env(),
+                "There is nothing to map: a random policy ignores the observation.")
   }
   xlim <- plain_numbers(xlim)
   ylim <- plain_numbers(ylim)
@@ -162,11 +162,11 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
   }
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
   if (!inherits(policy, "gym_policy_network") && !played) {
-    abort_misuse("env", env, call,
-                 "Without `env` a decision map needs a network, or a model that was played, not
-                  {policy_text(policy)}.",
-                 i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y =
-                      )`.")
+    abort_wrong("env", env, call,
+                "Without `env` a decision map needs a network, or a model that was played, not
+                 {policy_text(policy)}.",
+                i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y =
+                     )`.")
   }
   c(list(policy = policy), policy[c("observation_space", "action_space", "env_id", "wrappers")])
 }
@@ -193,8 +193,8 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
     ))
   }
   if (!is.null(space) && !inherits(space, "gym_space_discrete")) {
-    abort_misuse("policy", place$policy, call,
-                 "A decision map shows actions that are discrete or a Box, not of {format(space)}.")
+    abort_wrong("policy", place$policy, call,
+                "A decision map shows actions that are discrete or a Box, not of {format(space)}.")
   }
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)

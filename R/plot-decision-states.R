@@ -9,9 +9,9 @@ is_counted <- function(space) {
 
 counted_map <- function(place, env, client, x, y, xlim, ylim, at, call) {
   if (!inherits(place$action_space, "gym_space_discrete")) {
-    abort_misuse("policy", place$policy, call,
-                 "A map of states shows actions that are Discrete, not
-                  {format(place$action_space)}.")
+    abort_wrong("policy", place$policy, call,
+                "A map of states shows actions that are Discrete, not
+                 {format(place$action_space)}.")
   }
   if (inherits(place$observation_space, "gym_space_discrete")) {
     new_state_map(place, env, client, call)

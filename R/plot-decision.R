@@ -148,9 +148,9 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   }
   if (type == "q") {
     if (!inherits(object$policy, "gym_policy_table")) {
-      abort_misuse("type", object$policy, rlang::current_env(),
-                   "Values of actions are those of a `policy_table()`, not of
-                    {describe_argument(object$policy)}.")
+      abort_wrong("type", object$policy, rlang::current_env(),
+                  "Values of actions are those of a `policy_table()`, not of
+                   {describe_argument(object$policy)}.")
     }
     data$cells$value <- ifelse(is.na(data$cells$action), NA, 0)
     data$q <- q_of_cells(object$policy$q, object$grid$state, data)

@@ -105,9 +105,9 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
 #' @exportS3Method ggplot2::autoplot
 autoplot.gym_policy <- function(object, ...) {
   is_table <- inherits(object, "gym_policy_table")
-  abort_misuse("x", object, rlang::current_env(),
-               "Only a network can be drawn, not a policy that is {format(object)}.",
-               i = if (is_table) table_hint else "`policy_network()` makes one.")
+  abort_wrong("x", object, rlang::current_env(),
+              "Only a network can be drawn, not a policy that is {format(object)}.",
+              i = if (is_table) table_hint else "`policy_network()` makes one.")
 }
 
 # Where neurons and weights stand, and what they are called -------------------------------

@@ -76,8 +76,8 @@ autoplot.gym_rollout <- function(object, ..., type = c("returns", "trajectory", 
   x <- rollouts[[1L]]
   several <- length(rollouts) > 1L
   if (several && type != "returns") {
-    abort_misuse("...", NULL, rlang::current_env(),
-                 "A {type} shows one rollout, not {length(rollouts)}.")
+    abort_wrong("...", NULL, rlang::current_env(),
+                "A {type} shows one rollout, not {length(rollouts)}.")
   }
   comparison <- several || !is.null(x$episodes$candidate)
   switch(type,
@@ -96,10 +96,10 @@ given_rollouts <- function(values, call = rlang::caller_env()) {
   rollouts <- only_results(values, "gym_rollout", call)
   for (rollout in rollouts) {
     if (!nrow(rollout$episodes)) {
-      abort_misuse("x", rollout, call,
-                   "A rollout in {env_text(rollout)} has no episode to plot: it was interrupted
-                    before the first batch of episodes had ended.",
-                   i = "The same call of `rollout()` with its `seed` plays it again.")
+      abort_wrong("x", rollout, call,
+                  "A rollout in {env_text(rollout)} has no episode to plot: it was interrupted
+                   before the first batch of episodes had ended.",
+                  i = "The same call of `rollout()` with its `seed` plays it again.")
     }
   }
   rollouts

@@ -36,13 +36,13 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
     return(trainings_picture(trainings))
   }
   if (length(trainings) > 1L) {
-    abort_misuse("type", type, rlang::current_env(),
-                 "A picture of {type} shows one training, not {length(trainings)}.")
+    abort_wrong("type", type, rlang::current_env(),
+                "A picture of {type} shows one training, not {length(trainings)}.")
   }
   x <- trainings[[1L]]
   if (!NROW(x$history)) {
-    abort_misuse("x", x, rlang::current_env(),
-                 "There is nothing to plot: the training ended before its first iteration did.")
+    abort_wrong("x", x, rlang::current_env(),
+                "There is nothing to plot: the training ended before its first iteration did.")
   }
   if (type == "diagnostics") {
     return(diagnostics_picture(x))
@@ -119,9 +119,9 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
   check_dots_empty(...)
   means <- object$rounds
   if (!nrow(means)) {
-    abort_misuse("x", object, rlang::current_env(),
-                 "There is nothing to plot: the search ended before its first round was played to
-                  its end.")
+    abort_wrong("x", object, rlang::current_env(),
+                "There is nothing to plot: the search ended before its first round was played to
+                 its end.")
   }
   outcome <- if (object$solved) {
     paste("solved in round", object$round)

@@ -58,8 +58,8 @@ iterations_picture <- function(trainings, call = rlang::caller_env()) {
     vapply(reached, function(one) nrow(one$history), 0L)
   })
   if (!length(unlist(needed))) {
-    abort_misuse("x", trainings[[1L]], call,
-                 "There is nothing to plot: no seed has reached the target.")
+    abort_wrong("x", trainings[[1L]], call,
+                "There is nothing to plot: no seed has reached the target.")
   }
   counts <- paste(lengths(needed), "of", lengths(each))
   several <- length(each) > 1L
@@ -159,7 +159,7 @@ evaluation_curves <- function(x, label, call) {
   })
   each <- each[vapply(each, nrow, 0L) > 0L]
   if (!length(each)) {
-    abort_misuse("x", x, call, "There is nothing to plot: no policy of {label} was evaluated.")
+    abort_wrong("x", x, call, "There is nothing to plot: no policy of {label} was evaluated.")
   }
   each
 }
@@ -250,9 +250,9 @@ varied_settings <- function(names) {
 diagnostics_picture <- function(x, call = rlang::caller_env()) {
   names <- names(agent_log(x$agent))
   if (!length(names)) {
-    abort_misuse("type", "diagnostics", call,
-                 "The training has no diagnostics: {training_label(x)} logs none.",
-                 i = "`agent_ppo()` and other agents with a method of `agent_log()` do.")
+    abort_wrong("type", "diagnostics", call,
+                "The training has no diagnostics: {training_label(x)} logs none.",
+                i = "`agent_ppo()` and other agents with a method of `agent_log()` do.")
   }
   rows <- do.call(rbind, lapply(names, function(name) {
     data.frame(steps = x$history$steps, name = name, value = x$history[[name]])

@@ -132,8 +132,8 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
                                  call = rlang::caller_env()) {
   row <- episode_row(x, episode, candidate, call)
   if (is.null(x$steps)) {
-    abort_misuse("x", x, call, "This rollout was played without its steps being kept.",
-                 i = "`rollout(..., steps = TRUE)` keeps them in a table.")
+    abort_wrong("x", x, call, "This rollout was played without its steps being kept.",
+                i = "`rollout(..., steps = TRUE)` keeps them in a table.")
   }
   own <- x$episodes[row, ]
   ending <- if (own$terminated) "terminated" else "truncated"

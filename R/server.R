@@ -67,18 +67,18 @@ gym_server_start <- function(port = NULL, python = NULL, ..., timeout = 60,
   # Evaluate the token first: any later error would show the call with it.
   hide_token(token)
   if (!rlang::is_bool(token)) {
-    abort_misuse("token", NULL, rlang::current_env(), "`token` must be `TRUE` or `FALSE`.",
-                 i = "Set your own token in a file, by `token_file = `, or in the environment
-                      variable {token_variable}.")
+    abort_wrong("token", NULL, rlang::current_env(), "`token` must be `TRUE` or `FALSE`.",
+                i = "Set your own token in a file, by `token_file = `, or in the environment
+                     variable {token_variable}.")
   }
   check_count(port, min = 0, max = 65535, allow_null = TRUE)
   check_string(python, allow_null = TRUE)
   check_number(timeout, min = 0.001)
   check_string(users, allow_null = TRUE)
   if (token && !is.null(users)) {
-    abort_misuse("token", NULL, rlang::current_env(),
-                 "`token = TRUE` and `users` exclude each other: `users` has a token for each
-                  user.")
+    abort_wrong("token", NULL, rlang::current_env(),
+                "`token = TRUE` and `users` exclude each other: `users` has a token for each
+                 user.")
   }
   options <- c(list(...), if (!is.null(users)) list(users = users))
   client <- start_server(port, python, options, timeout, token)
@@ -208,10 +208,10 @@ gym_server_log <- function(client = NULL) {
 session_server <- function(client, call = rlang::caller_env()) {
   client <- client %||% the_session$client
   if (is.null(client)) {
-    abort_misuse(NULL, NULL, call, "This session has started no server.")
+    abort_wrong(NULL, NULL, call, "This session has started no server.")
   }
   check_client(client, call = call)
-  the_session$servers[[client$remote_base]] %||% abort_misuse(
+  the_session$servers[[client$remote_base]] %||% abort_wrong(
     NULL, NULL, call, "The server at {client$remote_base} was not started by this session.",
     i = "`shutdown_server()` stops any server."
   )

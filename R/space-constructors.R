@@ -125,9 +125,9 @@ space_text <- function(max_length, min_length = 1, characters = c(letters, LETTE
 space_tuple <- function(...) {
   spaces <- list(...)
   if (!is.null(names(spaces))) {
-    abort_misuse("...", spaces, rlang::current_env(),
-                 "The spaces of a Tuple have no names: `space_dict()` makes a space of spaces with
-                  names.")
+    abort_wrong("...", spaces, rlang::current_env(),
+                "The spaces of a Tuple have no names: `space_dict()` makes a space of spaces with
+                 names.")
   }
   check_spaces(spaces)
   make_space("Tuple", dtype = NULL, spaces = spaces)
@@ -222,7 +222,7 @@ check_spaces <- function(spaces, call = rlang::caller_env()) {
 
 check_space <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (!inherits(x, "gym_space")) {
-    abort_misuse(arg, x, call, "`{arg}` must be a space, not {describe_argument(x)}.",
-                 i = "`space_box()`, `space_discrete()` and others make one.")
+    abort_wrong(arg, x, call, "`{arg}` must be a space, not {describe_argument(x)}.",
+                i = "`space_box()`, `space_discrete()` and others make one.")
   }
 }

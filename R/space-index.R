@@ -86,9 +86,9 @@ rows_of_table <- function(index, space, observation, n, call) {
   row <- index$index(observation, n)
   if (anyNA(row)) {
     wrong <- batch_value(space, observation, which(is.na(row))[[1L]])
-    abort_misuse("observation", observation, call,
-                 "The table has no row for the observation {describe_value(wrong)}.",
-                 i = "It has one for each value of {format(space)}.")
+    abort_wrong("observation", observation, call,
+                "The table has no row for the observation {describe_value(wrong)}.",
+                i = "It has one for each value of {format(space)}.")
   }
   row
 }
@@ -151,16 +151,16 @@ values_batch <- function(space, columns) {
 table_index <- function(space, what, call) {
   index <- space_index(space)
   if (is.null(index)) {
-    abort_misuse(NULL, space, call,
-                 "A table needs {what} that can be counted, but {format(space)} cannot.",
-                 i = "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these.",
-                 i = "For observations in a Box use a network or features.")
+    abort_wrong(NULL, space, call,
+                "A table needs {what} that can be counted, but {format(space)} cannot.",
+                i = "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these.",
+                i = "For observations in a Box use a network or features.")
   }
   if (index$count > most_values) {
-    abort_misuse(NULL, space, call,
-                 "A table for {format(space)} would have {whole_number_text(index$count)} rows; at
-                  most {whole_number_text(most_values)} are possible.",
-                 i = "With `features`, such as `tile_coding()`, observations share a value.")
+    abort_wrong(NULL, space, call,
+                "A table for {format(space)} would have {whole_number_text(index$count)} rows; at
+                 most {whole_number_text(most_values)} are possible.",
+                i = "With `features`, such as `tile_coding()`, observations share a value.")
   }
   index
 }

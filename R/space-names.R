@@ -180,7 +180,7 @@ encoded_values <- function(space, x, what, call) {
   }
   place <- match(as.character(x), value_labels(space))
   if (anyNA(place)) {
-    abort_misuse(
+    abort_wrong(
       NULL, x, call, "There is no {what} {describe_value(as.character(x)[is.na(place)][[1L]])}.",
       i = did_you_mean(as.character(x)[is.na(place)][[1L]], value_labels(space), "\"%s\""),
       i = "There are {few_names(value_labels(space))}."

@@ -4,7 +4,7 @@
 # R's own error for a missing argument names a function that the user has not called.
 check_given <- function(x, hint = NULL, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (missing(x)) {
-    abort_misuse(arg, NULL, call, "`{arg}` is missing.", i = hint)
+    abort_wrong(arg, NULL, call, "`{arg}` is missing.", i = hint)
   }
 }
 
@@ -50,9 +50,9 @@ check_seeds <- function(seeds, call = rlang::caller_env()) {
   for (i in seq_along(seeds)) check_seed(seeds[[i]], arg = paste0("seeds[", i, "]"), call = call)
   if (anyDuplicated(seeds)) {
     twice <- seeds[[anyDuplicated(seeds)]]
-    abort_misuse("seeds", seeds, call,
-                 "`seeds` must be different, but {twice} occurs more than once.",
-                 i = "`unique(seeds)` has each of them once.")
+    abort_wrong("seeds", seeds, call,
+                "`seeds` must be different, but {twice} occurs more than once.",
+                i = "`unique(seeds)` has each of them once.")
   }
 }
 
@@ -90,13 +90,13 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {
-    abort_misuse(NULL, NULL, call, "`{arg}` has `{names(x)[[twice]]}` more than once.")
+    abort_wrong(NULL, NULL, call, "`{arg}` has `{names(x)[[twice]]}` more than once.")
   }
 }
 
 check_dots_named <- function(dots, example, call = rlang::caller_env()) {
   if (length(dots) && !rlang::is_named(dots)) {
-    abort_misuse(NULL, NULL, call, "Further arguments need names, such as `{example}`.")
+    abort_wrong(NULL, NULL, call, "Further arguments need names, such as `{example}`.")
   }
   check_unique_names(dots, "...", call)
 }
@@ -139,7 +139,7 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
   if (...length()) {
     given <- names(list(...))[[1L]] %||% ""
     name <- if (nzchar(given)) paste0("`", given, "`") else describe_argument(..1)
-    abort_misuse("...", list(...), call, "There is no argument for {name} here.")
+    abort_wrong("...", list(...), call, "There is no argument for {name} here.")
   }
 }
 
@@ -147,17 +147,17 @@ check_dots_empty <- function(..., call = rlang::caller_env()) {
 #' @noRd
 check_suggested <- function(package, purpose, call = rlang::caller_env()) {
   if (!requireNamespace(package, quietly = TRUE)) {
-    abort_misuse(NULL, NULL, call, "The package {package} is required to {purpose}.",
-                 i = "`install.packages(\"{package}\")` installs it.")
+    abort_wrong(NULL, NULL, call, "The package {package} is required to {purpose}.",
+                i = "`install.packages(\"{package}\")` installs it.")
   }
 }
 
 check_columns <- function(x, needed, arg, call) {
   absent <- setdiff(needed, names(x))
   if (length(absent)) {
-    abort_misuse(arg, x, call, "`{arg}` has no column {quoted_names(absent)}.",
-                 i = if (length(absent) == 1L) did_you_mean(absent, names(x)),
-                 i = if (length(x)) paste0("Its columns are ", few_names(names(x)), "."))
+    abort_wrong(arg, x, call, "`{arg}` has no column {quoted_names(absent)}.",
+                i = if (length(absent) == 1L) did_you_mean(absent, names(x)),
+                i = if (length(x)) paste0("Its columns are ", few_names(names(x)), "."))
   }
 }
 
@@ -165,9 +165,9 @@ check_column <- function(x, name, must, are_good, arg, call) {
   good <- are_good(x[[name]])
   if (!all(good)) {
     row <- which(!good)[[1L]]
-    abort_misuse(arg, x, call,
-                 "The column `{name}` of `{arg}` must have {must}, and in row {row} it has
-                  {describe_value(x[[name]][[row]])}.")
+    abort_wrong(arg, x, call,
+                "The column `{name}` of `{arg}` must have {must}, and in row {row} it has
+                 {describe_value(x[[name]][[row]])}.")
   }
 }
 
@@ -180,8 +180,8 @@ are_probabilities <- function(x) if (is.numeric(x)) !is.na(x) & x >= 0 & x <= 1 
 are_flags <- function(x) if (is.logical(x)) !is.na(x) else FALSE
 
 abort_argument <- function(x, must, arg, call, hint = NULL) {
-  abort_misuse(arg, x, call, "`{arg}` must be {must}, not {describe_argument(x)}.",
-               i = integer64_hint(x), i = hint)
+  abort_wrong(arg, x, call, "`{arg}` must be {must}, not {describe_argument(x)}.",
+              i = integer64_hint(x), i = hint)
 }
 
 is_number <- function(x) {

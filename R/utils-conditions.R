@@ -18,20 +18,29 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
 
 #' Raise an error about an argument
 #'
-#' @param arg,value The argument's name, and its value.
+#' @param argument,value Its name and its value.
 #' @param call The frame of the function that the user has called.
-#' @param ... The message and, named `i` or `x`, its bullets; `NULL` for none. A string written in
-#'   the call is a template, in which `{x}` is the value of R code, as in [cli::pluralize()], and a
-#'   line break is a space. Any other code gives a text that is shown as it is: it may contain
-#'   braces that a user or a server wrote.
+#' @param ... The lines of the message, with the names of bullets; those without text are left out.
+#'   A string written in the call, also as a branch of `if`, is a template, in which `{x}` is the
+#'   value of R code, as in [cli::pluralize()], and a line break is a space. Any other code gives a
+#'   text that is shown as it is: it may have braces that a user or a server wrote.
 #' @noRd
-abort_misuse <- function(arg, value, call, ..., class = "gym_error_argument") {
+abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument") {
   frame <- parent.frame()
-  bullets <- lapply(as.list(substitute(list(...)))[-1L], function(part) {
-    if (!is.character(part)) return(eval(part, frame))
-    as.character(cli::pluralize(gsub("\\s*\n\\s*", " ", part), .envir = frame))
-  })
-  gym_abort(unlist(bullets), class = class, argument = arg, value = value, call = call)
+  fill <- function(part) {
+    if (is.call(part) && identical(part[[1L]], quote(`if`))) {
+      chosen <- if (eval(part[[2L]], frame)) 3L else 4L
+      if (chosen <= length(part)) fill(part[[chosen]])
+    } else if (is.call(part) && identical(part[[1L]], quote(`{`))) {
+      fill(part[[length(part)]])
+    } else if (is.character(part)) {
+      as.character(cli::pluralize(gsub("\\s*\n\\s*", " ", part), .envir = frame))
+    } else {
+      eval(part, frame)
+    }
+  }
+  lines <- unlist(lapply(as.list(substitute(list(...)))[-1L], fill))
+  gym_abort(lines[nzchar(lines)], class = class, argument = argument, value = value, call = call)
 }
 
 #' Let errors name the call of the function that the user called

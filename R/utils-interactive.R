@@ -24,9 +24,9 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   }
   choice <- pmatch(tolower(answer), c("yes", "no"))
   if (is.na(choice)) {
-    abort_misuse(NULL, NULL, call, "Neither yes nor no: {describe_value(answer)}.",
-                 i = "Was that the next line of a script? Run this call by itself, answer, then the
-                      rest.")
+    abort_wrong(NULL, NULL, call, "Neither yes nor no: {describe_value(answer)}.",
+                i = "Was that the next line of a script? Run this call by itself, answer, then the
+                     rest.")
   }
   choice == 1L
 }
@@ -73,9 +73,9 @@ open_address <- function(address, viewer = check_viewer()) {
 check_viewer <- function(call = rlang::caller_env()) {
   viewer <- getOption("gym.viewer")
   if (!is.null(viewer) && !is.function(viewer) && !isFALSE(viewer)) {
-    abort_misuse("gym.viewer", viewer, call,
-                 "The option `gym.viewer` must be a function of an address, or FALSE, not
-                  {describe_argument(viewer)}.")
+    abort_wrong("gym.viewer", viewer, call,
+                "The option `gym.viewer` must be a function of an address, or FALSE, not
+                 {describe_argument(viewer)}.")
   }
   viewer
 }
