@@ -243,7 +243,8 @@ ask_stream <- function(stream, message, content, head, call) {
 }
 
 # Sends a message and reads so many numbers of the answer, or with `NULL` none. NULL if the
-# connection broke. tryCatch() would take three times as long.
+# connection broke: a default is evaluated in its function, so a handler that reads `broke` returns
+# from here. tryCatch() would take three times as long.
 exchange <- function(con, sent, count, broke = return(NULL)) {
   withCallingHandlers(
     {
