@@ -28,12 +28,13 @@ init_space.default <- function(space) {
 #' @export
 `$.gym_space` <- function(x, name) {
   element <- .subset2(x, name)
-  if (!is.null(element)) {
-    return(element)
+  if (is.null(element)) {
+    switch(
+      name, sample = function() space_sample(x), contains = function(value) space_contains(x, value)
+    )
+  } else {
+    element
   }
-  switch(
-    name, sample = function() space_sample(x), contains = function(value) space_contains(x, value)
-  )
 }
 
 # In words ------------------------------------------------------------------------
