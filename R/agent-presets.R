@@ -18,8 +18,8 @@
 #'   returns all.
 #' @return A data frame with a row for each preset:
 #'   \describe{
-#'   \item{env_id, kwargs}{The environment's id, a string, and its arguments as JSON, empty for
-#'   none.}
+#'   \item{env_id, kwargs}{The environment's id, a string (`"ALE/*"` for all Atari games), and its
+#'   arguments as JSON, empty for none.}
 #'   \item{agent}{`"ars"`, `"cem"`, `"ppo"`, `"reinforce"`, `"dqn"`, `"q"`, `"sarsa"` or
 #'   `"monte_carlo"`, or in capitals an algorithm of [learn_sb3()], such as `"SAC"`. The agent's
 #'   arguments have a column each, see [agent_ars()] and the others; `NA` for an argument that the
@@ -68,7 +68,8 @@ read_presets <- function(name, env_id) {
     presets[[name]][is.na(presets[[name]])] <- ""
   }
   if (!is.null(env_id)) {
-    presets <- presets[presets$env_id == env_id, ]
+    games <- grepl("^ALE/", env_id)
+    presets <- presets[presets$env_id == env_id | games & presets$env_id == "ALE/*", ]
   }
   row.names(presets) <- NULL
   presets

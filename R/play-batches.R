@@ -45,6 +45,9 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
   } else {
     stepped(vector_env)
   }
+  if (isTRUE(vector_env$apart)) {
+    return(play_apart(vector_env, history, policy_of, report, max_steps, keep_steps, ...))
+  }
   if (!is.null(vector_env$description)) {
     return(play_beside(
       vector_env, history, policy_of, report, ..., keep_steps = keep_steps, max_steps = max_steps
@@ -157,6 +160,7 @@ with_vector_env <- function(env, episodes, play, max_steps = NULL, ..., client =
   complete <- function(vector_env) {
     vector_env$call <- call
     vector_env$recipe <- environment_recipe(env, vector_env, arguments)
+    vector_env$made_of <- list(env = env, arguments = arguments)
     vector_env
   }
   make <- function() {

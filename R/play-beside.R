@@ -11,9 +11,14 @@
 #' @param vector_env As passed on by [with_vector_env()].
 #' @param policy The policy, bound to the environment, or several candidates.
 #' @param max_steps,keep_steps As for [play_batch()].
-#' @return The environment that plays: a described one, or one that is stepped from R.
+#' @return The environment that plays: a described one, one that is stepped from R, or one that is
+#'   `apart`: the policy's own program makes another.
 #' @noRd
 env_for_policy <- function(vector_env, policy, max_steps = Inf, keep_steps = FALSE) {
+  vector_env$apart <- plays_apart(policy)
+  if (vector_env$apart) {
+    return(seen_by(policy, vector_env))
+  }
   if (plays_beside(vector_env, policy, max_steps, keep_steps)) vector_env else stepped(vector_env)
 }
 

@@ -112,6 +112,8 @@ new_provenance <- function(vector_env, settings, started = Sys.time()) {
   described <- vector_env$description$versions
   way <- if (!is.null(vector_env$model)) {
     "from the model in R"
+  } else if (isTRUE(vector_env$apart)) {
+    "in a process of its own"
   } else if (is.null(vector_env$description)) {
     "step by step"
   } else {

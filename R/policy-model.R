@@ -30,7 +30,8 @@
 #' # Models of Stable-Baselines3
 #'
 #' `as_policy("model.zip")` reads a zip file that `model.save()` of Stable-Baselines3 made, such as
-#' those of its zoo, and makes a [policy_network()] of it. It needs the server's extra `"sb3"`. Such
+#' those of its zoo. It makes a [policy_network()] of it, or for a convolutional or recurrent policy
+#' one that Stable-Baselines3 plays, see [learn_sb3()]. It needs the server's extra `"sb3"`. Such
 #' a file has weights, settings in plain text, and pickles. A pickle from elsewhere can run any
 #' program with your rights, so none is loaded. What only a pickle says is an argument.
 #'

@@ -37,7 +37,7 @@ run_sb3 <- function() sub("'gym_server'", "'gym_server.sb3'", run_server, fixed 
 #'
 #' The child ends at its next step when its standard input is closed. That happens when the user
 #' interrupts R, and also if R is killed.
-#' @param job The job, a list. Its `task` is `"train"` or `"convert"`.
+#' @param job The job, a list. Its `task` is `"train"`, `"convert"`, `"play"` or `"act"`.
 #' @param folder The folder of its files.
 #' @param poll A function that is called several times a second.
 #' @return A list: what the job says in `result.json`, and `interrupted`.
@@ -45,7 +45,7 @@ run_sb3 <- function() sub("'gym_server'", "'gym_server.sb3'", run_server, fixed 
 run_sb3_job <- function(job, folder, python, call, poll = function() NULL) {
   file <- file.path(folder, "job.json")
   log <- file.path(folder, "output.log")
-  unlink(file.path(folder, c("result.json", "policy.safetensors")))
+  unlink(file.path(folder, "result.json"))
   replace_content(file, as_lines(to_json(job)))
   use_python(python)
   process <- start_python(
@@ -74,12 +74,14 @@ run_sb3_job <- function(job, folder, python, call, poll = function() NULL) {
   c(read_json_file(result), interrupted = interrupted)
 }
 
+read_bytes <- function(file) readBin(file, "raw", file.size(file))
+
 read_json_file <- function(file) from_json(paste(readLines(file, warn = FALSE), collapse = "\n"))
 
-# Waits as long as its step takes, which may be the update after a long rollout. A second interrupt
-# leaves this, and the child is killed.
+# Waits as long as its step takes, which may be the update after a long rollout, or an episode that
+# is played. A second interrupt leaves this, and the child is killed.
 end_child <- function(process) {
-  cli::cli_inform(c(i = "Ending the training at its next step."))
+  cli::cli_inform(c(i = "Ending it as soon as possible."))
   close_server_input(list(process = process))
   terminate_server(list(process = process))
   await_end(process, Inf)

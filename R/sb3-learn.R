@@ -13,27 +13,52 @@
 #'
 #' # Algorithms and their arguments
 #'
-#' `"PPO"`, `"A2C"`, `"DQN"`, `"SAC"`, `"TD3"` and `"DDPG"` of Stable-Baselines3, `"TQC"`,
-#' `"TRPO"`, `"QRDQN"` and `"CrossQ"` of sb3-contrib. Their arguments in `...` have the names of
-#' Python's, such as `learning_rate`, `buffer_size` or
-#' `policy_kwargs = list(net_arch = c(400, 300), activation_fn = "ReLU")`. As in rl-baselines3-zoo,
-#' `learning_rate = "lin_3e-4"` decreases from 3e-4 to 0, and `noise_type = "normal"` with
-#' `noise_std` adds noise to the actions of TD3 and DDPG.
+#' `"PPO"`, `"A2C"`, `"DQN"`, `"SAC"`, `"TD3"` and `"DDPG"` of Stable-Baselines3, `"TQC"`, `"TRPO"`,
+#' `"QRDQN"`, `"CrossQ"`, `"RecurrentPPO"` and `"MaskablePPO"` of sb3-contrib. Their arguments in
+#' `...` have the names of Python's, such as `learning_rate`, `buffer_size` or `policy_kwargs =
+#' list(net_arch = c(400, 300), activation_fn = "ReLU")`. As in rl-baselines3-zoo, `learning_rate =
+#' "lin_3e-4"` decreases from 3e-4 to 0, and `noise_type = "normal"` with `noise_std` adds noise to
+#' the actions of TD3 and DDPG.
 #'
 #' For some environments the values of
 #' [rl-baselines3-zoo](https://github.com/DLR-RM/rl-baselines3-zoo) are presets, see
 #' [agent_presets()]. A message says so. Arguments that you give replace them. Without a preset the
 #' defaults are the library's.
 #'
+#' `"MlpPolicy"` is a network of full layers, `"CnnPolicy"` one for pictures, `"MultiInputPolicy"`
+#' one for a Dict. Those of RecurrentPPO, `"MlpLstmPolicy"` and so on, remember earlier
+#' observations. MaskablePPO needs environments that say which actions are valid, in
+#' `info["action_mask"]` as Taxi-v4 does, or by a method `action_masks()`.
+#'
+#' # Atari
+#'
+#' With a `"CnnPolicy"`, games such as `"ALE/Pong-v5"` are treated as by AtariWrapper of
+#' Stable-Baselines3: up to 30 steps without an action at the start, each action for 4 frames (for
+#' `frameskip` of them, if it is in `env_kwargs`), and pictures in grey of 84 x 84 pixels, four
+#' together. For training only, rewards are clipped to -1, 0 and 1, and an episode ends with a life.
+#' Evaluations and [rollout()] play whole games with their scores. The element `agent$preprocessing`
+#' of the result has these settings, and the probability that an action is repeated
+#' (`repeat_action_probability`, 0.25 in the games of version 5). In the history `mean_length`
+#' counts frames.
+#'
 #' # The policy
 #'
-#' The policy becomes a [policy_network()]. It acts in R alone, and [rollout()] plays it beside the
-#' environment. Actions must be Discrete or a Box, and observations numbers; the activations tanh,
-#' ReLU, leaky ReLU and logistic are known. With `normalize` the network has the moments of the
-#' observations. Its actions differ from those of `model.predict(deterministic = True)` by less than
-#' 1e-5 of their range, because PyTorch calculates in single precision. State-dependent exploration
-#' (`use_sde`) does not come back: the network takes the most likely actions. Convolutional and
-#' recurrent policies are refused before they are trained, because R could not play them.
+#' A network of full layers becomes a [policy_network()]. It acts in R alone, and [rollout()] plays
+#' it beside the environment. Actions must be Discrete or a Box, and observations numbers; the
+#' activations tanh, ReLU, leaky ReLU and logistic are known. With `normalize` the network has the
+#' moments of the observations. Its actions differ from those of `model.predict(deterministic =
+#' True)` by less than 1e-5 of their range, because PyTorch calculates in single precision.
+#' State-dependent exploration (`use_sde`) does not come back: the network takes the most likely
+#' actions.
+#'
+#' Any other policy, such as a convolutional or recurrent one, stays with Stable-Baselines3. It has
+#' the class `gym_policy_sb3` and holds its weights as safetensors, so [saveRDS()] keeps it.
+#' [rollout()], [evaluate_policy()] and [animate()] play its whole episodes in a Python process,
+#' which makes the environment itself and ends afterwards. So they need the environment's id.
+#' [predict()] and [act()] start such a process, too, which takes seconds: ask about many
+#' observations at once. These are what the policy sees, for Atari arrays of 4 x 84 x 84 numbers
+#' from 0 to 255. Each counts as the first one of an episode. The policy takes the most likely
+#' actions.
 #'
 #' # Going on
 #'
@@ -48,9 +73,12 @@
 #' @param total_steps The number of steps of the environment, a whole number. It may be left out if
 #'   there is a preset.
 #' @param ... Arguments of the algorithm, by their Python names.
-#' @param policy The policy's name in Stable-Baselines3, a string. The default is `"MlpPolicy"`.
+#' @param policy The policy's name in Stable-Baselines3, a string. The default is that of the
+#'   preset, or `"MlpPolicy"`.
 #' @param env_kwargs The arguments of the environment, a list with names.
-#' @param num_envs The number of sub-environments, a whole number. The default is 1.
+#' @param num_envs The number of sub-environments, a whole number. The default is 1, or that of the
+#'   preset. One process steps them one after another; the network gets all their observations
+#'   together.
 #' @param normalize Normalise observations and rewards by `VecNormalize`? `FALSE`, the default,
 #'   `TRUE`, or a list of its arguments, such as `list(norm_reward = FALSE)`. The log and all
 #'   evaluations show the original rewards.
@@ -215,6 +243,7 @@ train_sb3 <- function(settings, files, python, progress, client, call) {
     show(min(last[["time/total_timesteps"]], settings$total_steps),
          paste0("return ", number_text(last[["rollout/ep_rew_mean"]]), ", "))
   })
+  unlink(file.path(folder, "policy.safetensors"))
   result <- run_sb3_job(job, folder, python, call, poll)
   if (!file.exists(file.path(folder, "policy.safetensors"))) {
     rlang::cnd_signal(sb3_error(result$error, call))
@@ -255,14 +284,15 @@ sb3_poll <- function(folder, log, show) {
 }
 
 sb3_job <- function(settings, keeps) {
-  job <- settings[c("algorithm", "policy", "total_steps", "num_envs", "device", "eval_every")]
-  objects <- lapply(settings[c("env_kwargs", "arguments")], function(values) {
-    if (length(values)) values else rlang::set_names(list())
-  })
-  c(job, objects, list(
-    task = "train", env_id = settings$env, seed = settings$seed, normalize = settings$normalize,
-    eval_episodes = settings$eval_episodes_curve, checkpoint = keeps
-  ))
+  arguments <- settings$arguments
+  c(
+    settings[c("policy", "total_steps", "num_envs", "device", "eval_every", "seed", "normalize")],
+    sb3_env_job(settings$algorithm, settings$policy, settings$env, settings$env_kwargs),
+    list(
+      task = "train", eval_episodes = settings$eval_episodes_curve, checkpoint = keeps,
+      arguments = if (length(arguments)) arguments else rlang::set_names(list())
+    )
+  )
 }
 
 # What makes a training another one. The budget and the evaluations may differ.

@@ -2,12 +2,15 @@
 
 #' Make a policy of what a job of Stable-Baselines3 has written
 #' @param folder The job's folder.
-#' @return A [policy_network()] that is not bound yet.
+#' @return A [policy_network()], or a policy of class `gym_policy_sb3`, that is not bound yet.
 #' @noRd
 sb3_policy <- function(folder) {
-  file <- file.path(folder, "policy.safetensors")
-  read <- read_tensors(readBin(file, "raw", file.size(file)))
+  bytes <- read_bytes(file.path(folder, "policy.safetensors"))
+  read <- read_tensors(bytes)
   about <- from_json(read$metadata$about)
+  if (!is.null(about$algorithm)) {
+    return(new_sb3_policy(bytes, about))
+  }
   layers <- read$tensors[grep("^layer ", names(read$tensors))]
   weights <- unname(layers[order(as.integer(sub("layer ", "", names(layers))))])
   policy <- policy_network(

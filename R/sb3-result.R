@@ -92,6 +92,7 @@ sb3_training <- function(settings, folder, result, client, call) {
   bound$provenance$way <- paste0("by Stable-Baselines3 on ", result$device)
   agent <- settings$agent
   agent$policy <- bound$policy
+  agent$preprocessing <- result$preprocessing
   logged <- setdiff(names(history), names(no_iterations))
   agent$log <- unlist(history[nrow(history), logged, drop = FALSE]) %||% numeric()
   target <- training_target(settings, bound$spec)

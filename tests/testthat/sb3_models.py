@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from gym_server.sb3 import algorithms, files, train
+from gym_server.sb3 import algorithms, files, policies
 
 folder, n = Path(sys.argv[1]), int(sys.argv[2])
 draws = np.random.default_rng(1)
@@ -66,8 +66,8 @@ for case, (name, env_id, settings) in CASES.items():
     predicted, _ = model.predict(seen, deterministic=True)
     place = folder / case
     place.mkdir()
-    train.write_network(
-        place, train._network(model), train.moments_of(model.get_vec_normalize_env())
+    policies.write_network(
+        place, policies.network(model), policies.moments_of(model.get_vec_normalize_env())
     )
     if case in ("SAC", "PPO of a Box", "QRDQN", "A2C with LeakyReLU"):
         model.save(place / "model.zip")

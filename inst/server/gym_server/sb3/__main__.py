@@ -26,13 +26,15 @@ def main(path: Path) -> None:
     signal.signal(signal.SIGTERM, lambda *_: stopping.set())
     threading.Thread(target=_await_end_of_input, args=[stopping], daemon=True).start()
     # PyTorch takes seconds to import; an end that comes meanwhile is not lost.
-    from gym_server.sb3 import convert, files, train
+    from gym_server.sb3 import convert, files, play, train
     from gym_server.sb3.failures import in_words
 
     job: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     tasks: dict[str, Callable[..., dict[str, Any]]] = {
         "train": train.train,
         "convert": convert.convert,
+        "play": play.play,
+        "act": play.act,
     }
     try:
         result = tasks[job["task"]](job, path.parent, stopping)

@@ -15,13 +15,17 @@ import torch
 from gymnasium.spaces import Box, Space
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
+from stable_baselines3.common.sb2_compat.rmsprop_tf_like import RMSpropTFLike
 
 from gym_server.sb3.failures import JobError
 
 NAMES = (
     *("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG"),
-    *("TQC", "TRPO", "QRDQN", "CrossQ"),
+    *("TQC", "TRPO", "QRDQN", "CrossQ", "RecurrentPPO", "MaskablePPO"),
 )
+
+# As in rl-baselines3-zoo, besides PyTorch's.
+_OPTIMIZERS = {"RMSpropTFLike": RMSpropTFLike}
 
 # They are arguments of learn_sb3() itself, or of Python's objects.
 _NOT_GIVEN = {"self", "policy", "env", "seed", "device", "verbose", "tensorboard_log"}
@@ -103,11 +107,12 @@ def _noise(space: Space, noise_type: str, noise_std: float | None) -> Any:
 
 
 def _policy_arguments(values: dict[str, Any]) -> dict[str, Any]:
-    name = values.get("activation_fn")
-    if isinstance(name, str):
-        values["activation_fn"] = getattr(torch.nn, name, None)
-        if values["activation_fn"] is None:
-            raise JobError(f'torch.nn has no "{name}".', argument="policy_kwargs")
+    for name, home in (("activation_fn", torch.nn), ("optimizer_class", torch.optim)):
+        wanted = values.get(name)
+        if isinstance(wanted, str):
+            values[name] = _OPTIMIZERS.get(wanted) or getattr(home, wanted, None)
+            if values[name] is None:
+                raise JobError(f'{home.__name__} has no "{wanted}".', argument="policy_kwargs")
     # R has no vector of one number that it would tell from the number.
     layers = values.get("net_arch")
     if isinstance(layers, int):

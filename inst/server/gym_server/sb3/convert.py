@@ -17,20 +17,20 @@ import numpy as np
 import torch
 from stable_baselines3.common.save_util import load_from_zip_file
 
+from gym_server.sb3 import algorithms, policies
 from gym_server.sb3.failures import JobError
 from gym_server.sb3.networks import NotANetworkError, network_of
-from gym_server.sb3.train import write_network
 
 _NO_MODEL = "is no model that Stable-Baselines3 saved"
 
 
 def convert(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[str, Any]:
-    """Write the network of a zip file, as ``train()`` does.
+    """Write the policy of a zip file, as ``train()`` does.
 
     Args:
         job: the file, as ``file``; ``activation``, if it is given; ``moments``, with which the
             observations were normalized, or None.
-        folder: where the network goes.
+        folder: where the policy goes.
         stopping: unused, because this takes no time.
     """
     path = Path(job["file"])
@@ -50,7 +50,9 @@ def convert(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dic
     weights = {name: np.asarray(value) for name, value in states.items() if torch.is_tensor(value)}
     about_policy = said.get("policy_kwargs") or {}
     named = re.search(r"(\w+)'>", str(about_policy.get("activation_fn", "")))
+    moments = job["moments"]
     try:
+        _check_plain(said)
         network = network_of(
             weights,
             _actions(said),
@@ -58,13 +60,15 @@ def convert(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dic
             about_policy.get("squash_output") is True,
             float(about_policy.get("clip_mean", 2.0)),
         )
+        inputs = network.layers[0].shape[1] - 1
+        policies.write_network(folder, network, _moments(moments, inputs))
     except NotANetworkError as reason:
-        raise JobError(
-            f'The policy in "{path.name}" does not become a network: {reason}.',
-            "Train it again by `learn_sb3()`, or play it in Python.",
-            argument="x",
-        ) from reason
-    write_network(folder, network, _moments(job["moments"], network.layers[0].shape[1] - 1))
+        algorithm, policy = _policy(said, path.name, reason)
+        arguments = _arguments(said, job["activation"] or (named[1] if named else None))
+        count = len(moments["mean"]) if moments else 0
+        policies.write_states(
+            folder, weights, algorithm, policy, arguments, _moments(moments, count)
+        )
     return {"steps": said.get("num_timesteps"), "error": None}
 
 
@@ -75,6 +79,42 @@ def _said(path: Path) -> dict[str, Any]:
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as failure:
         raise JobError(f'"{path.name}" {_NO_MODEL}.', argument="x") from failure
     return said
+
+
+def _check_plain(said: dict[str, Any]) -> None:
+    if "maskable" in str((said.get("policy_class") or {}).get("__module__")):
+        raise NotANetworkError("it needs the mask of valid actions")
+    if "Dict" in str((said.get("observation_space") or {}).get(":type:")):
+        raise NotANetworkError("its observations have several parts")
+
+
+def _policy(said: dict[str, Any], name: str, reason: Exception) -> tuple[str, str]:
+    """Return an algorithm that has the policy, and the policy's name there."""
+    about = said.get("policy_class") or {}
+    made = re.search(r"<function (\w+)\.__init__", str(about.get("__init__", "")))
+    for algorithm in algorithms.NAMES:
+        for alias, policy in algorithms.algorithm(algorithm).policy_aliases.items():
+            if (about.get("__module__"), made and made[1]) == (policy.__module__, policy.__name__):
+                return algorithm, alias
+    raise JobError(
+        f'The policy in "{name}" is not one of Stable-Baselines3, nor a network of R: {reason}.',
+        "Train it again by `learn_sb3()`, or play it in Python.",
+        argument="x",
+    ) from reason
+
+
+def _arguments(said: dict[str, Any], activation: str | None) -> dict[str, Any]:
+    """Return the policy's arguments; those that only a pickle says are left out."""
+    given = said.get("policy_kwargs") or {}
+    plain = {
+        name: value
+        for name, value in given.items()
+        if not name.startswith((":", "optimizer")) and not str(value).startswith("<")
+    }
+    if activation is not None:
+        plain["activation_fn"] = activation
+    own = {"policy_kwargs": plain}
+    return {**own, "use_sde": True} if said.get("use_sde") else own
 
 
 def _actions(said: dict[str, Any]) -> int | None:

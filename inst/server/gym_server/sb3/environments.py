@@ -1,32 +1,123 @@
-"""The environments that an algorithm trains in, and is evaluated in."""
+"""The environments that an algorithm trains in, and that its policy is judged by."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import gymnasium
+import numpy as np
+from gymnasium.wrappers import FrameStackObservation, ReshapeObservation
+from stable_baselines3.common.atari_wrappers import AtariWrapper
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 
+from gym_server.envs import wrappers
+from gym_server.envs.config import Wrapper
 from gym_server.envs.make import check_kwargs, find_spec, make_from_spec
 from gym_server.errors import GymServerError
 from gym_server.sb3.failures import JobError
+from gym_server.vector_envs.sub_env import ThisThread
+
+# What an agent sees of an Atari game: pictures of this width, this many of them.
+_SCREEN, _STACK = 84, 4
 
 
-def vector_env(job: dict[str, Any], count: int) -> VecEnv:
-    """Return a vector environment of Stable-Baselines3.
+def single_env(
+    job: dict[str, Any], trains: bool = False, render_mode: str | None = None
+) -> gymnasium.Env:
+    """Return an environment.
 
     Args:
-        job: the job, with ``env_id`` and ``env_kwargs``.
-        count: the number of sub-environments.
+        job: the job, with ``algorithm``, ``env_id``, ``env_kwargs``, ``wrappers``, and ``atari``:
+            whether its pictures are those of a game.
+        trains: whether an algorithm learns from it. Its rewards are then clipped, and an episode
+            ends with a life.
+        render_mode: "rgb_array" for one that can be drawn.
     """
+    kwargs = dict(job["env_kwargs"])
+    atari = _preprocessing(kwargs) if job["atari"] else None
+    if atari is not None:
+        # AtariWrapper repeats actions itself, because it looks at the two last pictures.
+        kwargs["frameskip"] = 1
     try:
         spec = find_spec(job["env_id"], ())
-        check_kwargs(job["env_kwargs"])
-
-        def make() -> Any:
-            return Monitor(make_from_spec(spec, None, job["env_kwargs"]))
-
-        made: VecEnv = DummyVecEnv([make] * count)
+        check_kwargs(kwargs)
+        env = make_from_spec(spec, render_mode, kwargs)
+        chosen = [Wrapper(one["name"], one.get("kwargs") or {}) for one in job["wrappers"]]
+        env = wrappers.wrap(env, chosen, ThisThread())
     except GymServerError as refusal:
         raise JobError(refusal.message, refusal.hint, argument="env") from refusal
+    if trains:
+        env = Monitor(env)
+    if atari is not None:
+        env = AtariWrapper(env, **atari, terminal_on_life_loss=trains, clip_reward=trains)
+        env = FrameStackObservation(env, _STACK, padding_type="zero")
+        env = ReshapeObservation(env, (_STACK, _SCREEN, _SCREEN))
+    if job["algorithm"] == "MaskablePPO":
+        env = _Masked(env)
+        # Whether there are masks is known only then.
+        env.reset()
+    return env
+
+
+def vector_env(job: dict[str, Any]) -> VecEnv:
+    """Return a vector environment of Stable-Baselines3 for training."""
+    made: VecEnv = DummyVecEnv([lambda: single_env(job, trains=True)] * job["num_envs"])
     return made
+
+
+def has_limit(job: dict[str, Any]) -> bool:
+    """Return whether every episode ends; a game does after half an hour."""
+    return job["atari"] or gymnasium.spec(job["env_id"]).max_episode_steps is not None
+
+
+def preprocessing(job: dict[str, Any], env: VecEnv) -> dict[str, Any] | None:
+    """Return what was done to a game for training; None for another environment."""
+    if not job["atari"]:
+        return None
+    sticky = env.unwrapped.envs[0].spec.kwargs["repeat_action_probability"]
+    ours = {"frame_stack": _STACK, "clip_reward": True, "terminal_on_life_loss": True}
+    return {
+        **_preprocessing(dict(job["env_kwargs"])),
+        **ours,
+        "repeat_action_probability": sticky,
+    }
+
+
+def _preprocessing(kwargs: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of AtariWrapper, one of which is taken from the environment's."""
+    skip = kwargs.pop("frameskip", 4)
+    if isinstance(skip, list):
+        raise JobError("`frameskip` must be one number for a CnnPolicy.", argument="env_kwargs")
+    return {"noop_max": 30, "frame_skip": int(skip), "screen_size": _SCREEN}
+
+
+class _Masked(gymnasium.Wrapper):
+    """Offers the mask of valid actions in the infos by the method that MaskablePPO looks for."""
+
+    mask: Any = None
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        observation, info = self.env.reset(**kwargs)
+        return observation, self._note(info)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        *outcome, info = self.env.step(action)
+        return (*outcome, self._note(info))
+
+    def _note(self, info: dict[str, Any]) -> dict[str, Any]:
+        if hasattr(self.env.unwrapped, "action_masks"):
+            self.mask = self.env.unwrapped.action_masks()
+        elif "action_mask" in info:
+            self.mask = info["action_mask"]
+        else:
+            raise JobError(
+                f"{self.env.spec and self.env.spec.id} does not say which actions are valid.",
+                'MaskablePPO needs `info["action_mask"]`, as Taxi-v4 has; "PPO" does not.',
+                argument="algorithm",
+            )
+        return info
+
+    def action_masks(self) -> Any:
+        """Return whether each action is valid."""
+        return np.asarray(self.mask, dtype=bool)

@@ -14,16 +14,16 @@ import numpy as np
 import sb3_contrib
 import stable_baselines3
 import torch
-from gymnasium.spaces import Box, Discrete
+from gymnasium.spaces import Box
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from gym_server.sb3 import algorithms, checkpoints, files
-from gym_server.sb3.environments import vector_env
+from gym_server.rollouts.episode import play_episode
+from gym_server.sb3 import algorithms, checkpoints, policies
+from gym_server.sb3.environments import has_limit, preprocessing, single_env, vector_env
 from gym_server.sb3.failures import JobError, diverged, in_words
-from gym_server.sb3.networks import Network, NotANetworkError, network_of
 
 # Where an environment has no limit of its own, a policy may never end an episode.
 _LONGEST_EPISODE = 10_000
@@ -49,7 +49,8 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
         raise JobError(
             "PyTorch finds no GPU here.", 'device = "cpu" trains without.', argument="device"
         )
-    env = vector_env(job, job["num_envs"])
+    env = vector_env(job)
+    treated = preprocessing(job, env)
     arguments = algorithms.arguments_of(make, job["arguments"], env.action_space)
     if job["normalize"]:
         chosen = job["normalize"] if isinstance(job["normalize"], dict) else {}
@@ -57,7 +58,6 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
     before = checkpoints.state_of(folder)
     begun = before.get("num_timesteps", 0)
     model = _model(make, env, arguments, job, job["seed"] + begun)
-    _check_comes_back(model, job)
     checkpoints.restore(model, folder)
     model.set_logger(configure(str(folder), ["csv"]))
     callback = _Callback(job, folder, stopping, before)
@@ -72,7 +72,8 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
         error = in_words(failure)
         callback.go_back()
     callback.finish(keeps=error is None)
-    write_network(folder, _network(model), moments_of(model.get_vec_normalize_env()))
+    model.logger.close()
+    policies.write(folder, model, job)
     return {
         "steps": model.num_timesteps,
         "begun": begun,
@@ -81,6 +82,7 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
         "device": str(model.device),
         "processor_seconds": time.process_time(),
         "versions": versions(),
+        "preprocessing": treated,
     }
 
 
@@ -114,6 +116,13 @@ def _model(
             known = list(make.policy_aliases)
             message = f'{make.__name__} has no policy "{job["policy"]}".'
             raise JobError(message, argument="policy", known=known) from failure
+        if "NatureCNN" in text:
+            raise JobError(
+                f"A {job['policy']} sees pictures, not the {env.observation_space} of "
+                f"{job['env_id']}.",
+                '"MlpPolicy" is for numbers, "MultiInputPolicy" for a Dict of several parts.',
+                argument="policy",
+            ) from failure
         raise JobError(f"{make.__name__} refuses its arguments: {text}") from failure
 
 
@@ -132,12 +141,11 @@ class _Callback(BaseCallback):
         self.elapsed = before.get("elapsed", 0.0)
         self.began = time.monotonic()
         self.finite: dict[str, torch.Tensor] = {}
-        self.eval_env: VecEnv | None = None
+        self.player: policies.Player | None = None
 
     def _on_training_start(self) -> None:
         self.row_at = self.evaluated_at = self.num_timesteps
-        self.limited = gymnasium.spec(self.job["env_id"]).max_episode_steps is not None
-        if self.num_timesteps == 0 and self.limited:
+        if self.num_timesteps == 0 and has_limit(self.job):
             self._evaluate()
         self._remember()
 
@@ -199,27 +207,29 @@ class _Callback(BaseCallback):
             self.model.policy.load_state_dict(self.finite)
 
     def finish(self, keeps: bool) -> None:
-        """Write the last row, and a checkpoint; close the tables."""
+        """Write the last row, and a checkpoint."""
         if keeps and self.num_timesteps > self.row_at:
             self._row()
         if keeps and self.job["checkpoint"] and self.num_timesteps > 0:
             self._keep(self.elapsed + time.monotonic() - self.began)
-        self.logger.close()
 
     def _evaluate(self) -> None:
         """Play whole episodes, each with a seed of its own, and write how they went."""
         self.evaluated_at = self.num_timesteps
         if self.job["eval_episodes"] == 0:
             return
-        if self.eval_env is None:
-            self.eval_env = vector_env(self.job, 1)
+        if self.player is None:
+            moments = self.model.get_vec_normalize_env()
+            self.player = policies.Player(
+                self.model, single_env(self.job), None if moments is None else moments.normalize_obs
+            )
         draws = np.random.default_rng([self.job["seed"], self.num_timesteps])
-        seeds = draws.integers(2**31, size=self.job["eval_episodes"])
+        longest = None if has_limit(self.job) else _LONGEST_EPISODE
         played = []
-        for seed in seeds:
+        for seed in draws.integers(2**31, size=self.job["eval_episodes"]).tolist():
             if self.stopping.is_set():
                 return
-            played.append(self._play(self.eval_env, int(seed)))
+            played.append(play_episode(self.player.env, self.player, seed, longest, None)[:2])
         returns, lengths = zip(*played, strict=True)
         self.logger.record("eval/mean_reward", np.mean(returns))
         self.logger.record("eval/mean_ep_length", np.mean(lengths))
@@ -227,65 +237,3 @@ class _Callback(BaseCallback):
         line = json.dumps({**row, "returns": returns, "lengths": lengths})
         with (self.folder / "evaluations.jsonl").open("a", encoding="utf-8") as table:
             table.write(line + "\n")
-
-    def _play(self, env: VecEnv, seed: int) -> tuple[float, int]:
-        env.seed(seed)
-        observation: Any = env.reset()
-        moments = self.model.get_vec_normalize_env()
-        total, length, ended = 0.0, 0, False
-        while not ended and (self.limited or length < _LONGEST_EPISODE):
-            if moments is not None:
-                observation = moments.normalize_obs(observation)
-            action, _ = self.model.predict(observation, deterministic=True)
-            observation, rewards, dones, _ = env.step(action)
-            total, length, ended = total + float(rewards[0]), length + 1, bool(dones[0])
-        return total, length
-
-
-def _network(model: BaseAlgorithm) -> Network:
-    """Return the network that acts."""
-    states = model.policy.state_dict()
-    activation = getattr(model.policy, "activation_fn", None)
-    space = model.action_space
-    if not isinstance(space, (Box, Discrete)):
-        raise NotANetworkError("its actions are neither Discrete nor a Box")
-    return network_of(
-        {name: value.detach().cpu().numpy() for name, value in states.items()},
-        int(space.n) if isinstance(space, Discrete) else None,
-        activation.__name__ if activation is not None else None,
-        bool(getattr(model.policy, "squash_output", False)),
-        float(getattr(getattr(model, "actor", None), "clip_mean", 2.0)),
-    )
-
-
-def _check_comes_back(model: BaseAlgorithm, job: dict[str, Any]) -> None:
-    # Before anything is trained for hours.
-    try:
-        _network(model)
-    except NotANetworkError as reason:
-        raise JobError(
-            f"R could not play this {job['policy']} of {job['algorithm']}: {reason}.",
-            'Only networks of full layers come back, such as those of "MlpPolicy".',
-            argument="policy",
-        ) from reason
-
-
-def moments_of(env: VecNormalize | None) -> dict[str, Any] | None:
-    """Return how observations are normalized, None if they are not."""
-    if env is None or not env.norm_obs:
-        return None
-    found: Any = env.obs_rms
-    moments = {"mean": found.mean, "variance": found.var + env.epsilon, "count": found.count}
-    return {**moments, "clip_obs": env.clip_obs}
-
-
-def write_network(folder: Path, network: Any, moments: dict[str, Any] | None) -> None:
-    """Write a network as R's ``policy_network()`` takes it."""
-    tensors = {f"layer {i}": layer for i, layer in enumerate(network.layers)}
-    about: dict[str, Any] = {"output": network.output, "activation": network.activation}
-    if network.log_std is not None:
-        tensors["log_std"] = network.log_std
-    if moments is not None:
-        tensors.update({name: moments[name] for name in ("mean", "variance")})
-        about.update(clip_obs=moments["clip_obs"], count=moments["count"])
-    files.write_tensors(folder / "policy.safetensors", tensors, about)

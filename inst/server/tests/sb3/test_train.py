@@ -1,13 +1,7 @@
-"""Jobs, in one process for all of them, because PyTorch takes seconds to import.
-
-It is a process of its own, as it is for users: PyTorch may crash where other tests have loaded
-libraries that draw.
-"""
+"""Trainings, which run in the process with PyTorch."""
 
 import threading
-from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -23,6 +17,8 @@ JOB = {
     "algorithm": "PPO",
     "env_id": "CartPole-v1",
     "env_kwargs": {},
+    "wrappers": [],
+    "atari": False,
     "policy": "MlpPolicy",
     "arguments": {"n_steps": 32, "batch_size": 32},
     "total_steps": 200,
@@ -34,13 +30,6 @@ JOB = {
     "eval_episodes": 1,
     "checkpoint": False,
 }
-
-
-@pytest.fixture(scope="module")
-def child():
-    """Return a function that calls another one in the process with PyTorch."""
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        yield lambda *call, **kwargs: pool.submit(*call, **kwargs).result()
 
 
 def train(folder, **changes):
@@ -91,7 +80,8 @@ def has_gpu():
         ({"env_id": "CartPole-v99"}, "env", "no such version"),
         ({"env_kwargs": {"wind": 1}}, "env", "wind"),
         ({"device": "cuda"}, "device", "no GPU"),
-        ({"arguments": {"policy_kwargs": {"activation_fn": "ELU"}}}, "policy", "activation ELU"),
+        ({"algorithm": "MaskablePPO"}, "algorithm", "does not say which actions are valid"),
+        ({"policy": "CnnPolicy"}, "policy", "pictures"),
         ({"env_id": "Blackjack-v1"}, None, "not supported"),
     ],
 )
