@@ -1,5 +1,5 @@
-# Policies that play whole episodes in a program of their own, which also makes the environment, such
-# as those that stay with Stable-Baselines3.
+# Policies that play whole episodes in a program of their own, which also makes the environment,
+# such as those that stay with Stable-Baselines3.
 
 #' Play whole episodes with a policy that has a program of its own
 #'

@@ -108,7 +108,13 @@ sb3_error <- function(error, call) {
     gym_abort(
       c(error$message, i = error$hint, i = near,
         i = if (length(known) && is.null(near)) paste0("There are ", quoted_names(known), ".")),
-      class = if (is.null(error$argument)) "gym_error_training" else "gym_error_argument",
+      class = if (!is.null(error$argument)) {
+        "gym_error_argument"
+      } else if (isTRUE(error$checkpoint)) {
+        "gym_error_checkpoint"
+      } else {
+        "gym_error_training"
+      },
       argument = error$argument, call = call
     ),
     error = identity

@@ -300,11 +300,11 @@ of_sb3_training <- c("algorithm", "policy", "num_envs", "env_kwargs", "arguments
                      "normalize")
 
 go_on_or_begin <- function(job, folder, files, call) {
-  begun <- if (!is.null(files$checkpoint) && files$resume) sb3_state(folder)
+  begun <- if (!is.null(files$checkpoint) && files$resume) sb3_state(folder, call)
   if (is.null(begun)) {
     unlink(file.path(folder, c("checkpoint", "checkpoint-old", "checkpoint-new")), recursive = TRUE)
   } else {
-    before <- read_json_file(file.path(folder, "job.json"))
+    before <- read_checkpoint_file(file.path(folder, "job.json"), call)
     now <- from_json(to_json(job))
     differ <- Filter(function(name) !identical(before[[name]], now[[name]]), of_sb3_training)
     if (length(differ)) {

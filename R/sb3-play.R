@@ -70,7 +70,8 @@ sb3_env_job <- function(algorithm, policy, env, kwargs) {
 #' @param tensors Further files: a list of raw vectors by name.
 #' @param read A function of the folder and of what the job says.
 #' @noRd
-run_policy_job <- function(policy, job, read, call, tensors = list(), poll = function(folder) NULL) {
+run_policy_job <- function(policy, job, read, call, tensors = list(),
+                           poll = function(folder) NULL) {
   folder <- temporary_file("gym-sb3-")
   dir.create(folder)
   on.exit(unlink(folder, recursive = TRUE))

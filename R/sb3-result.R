@@ -32,10 +32,20 @@ sb3_forget_later <- function(folder) {
   }
 }
 
-sb3_state <- function(folder) {
+sb3_state <- function(folder, call = rlang::caller_env()) {
   files <- file.path(folder, c("checkpoint", "checkpoint-old"), "state.json")
   file <- files[file.exists(files)]
-  if (length(file)) read_json_file(file[[1L]])
+  if (length(file)) read_checkpoint_file(file[[1L]], call)
+}
+
+read_checkpoint_file <- function(file, call) {
+  tryCatch(read_json_file(file), error = function(cnd) {
+    gym_abort(
+      c(paste0("The checkpoint is damaged: ", file, " is no JSON document."),
+        i = "Put the file back, or give `resume = FALSE` to start again."),
+      class = "gym_error_checkpoint", call = call, parent = cnd
+    )
+  })
 }
 
 sb3_evaluation_lines <- function(folder) {

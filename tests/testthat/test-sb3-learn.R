@@ -63,6 +63,16 @@ test_that("a checkpoint goes on with the remaining steps", {
   )
 })
 
+test_that("a checkpoint that is damaged is named, with the fix", {
+  folder <- withr::local_tempdir()
+  dir.create(file.path(folder, "checkpoint"))
+  writeLines("{\"num_time", file.path(folder, "checkpoint", "state.json"))
+  expect_error(
+    sb3_state(folder), "state.json is no JSON document.*resume = FALSE",
+    class = "gym_error_checkpoint"
+  )
+})
+
 test_that("an interrupt keeps the policy, and a killed session leaves no child", {
   skip_unless_sb3()
   skip_on_os("windows")

@@ -17,6 +17,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
 
 from gym_server.sb3 import files
+from gym_server.sb3.failures import JobError
 
 # Larger replay buffers are left out: a training that goes on then first collects steps again.
 LARGEST_BUFFER = 4 * 2**30
@@ -72,10 +73,25 @@ def state_of(folder: Path) -> dict[str, Any]:
 
 
 def restore(model: BaseAlgorithm, folder: Path) -> None:
-    """Give a new model the state of the checkpoint, if there is one."""
+    """Give a new model the state of the checkpoint, if there is one.
+
+    Raises:
+        JobError: a file of it is damaged.
+    """
     place = _place(folder)
     if place is None:
         return
+    try:
+        _restore(model, place, state_of(folder))
+    except Exception as failure:
+        raise JobError(
+            f"The checkpoint in {place} is damaged: {' '.join(str(failure).split())[:200]}",
+            "Put its files back, or give `resume = FALSE` to start again.",
+            checkpoint=True,
+        ) from failure
+
+
+def _restore(model: BaseAlgorithm, place: Path, state: dict[str, Any]) -> None:
     _, parameters, variables = load_from_zip_file(
         place / "model.zip", device=model.device, load_data=False
     )
@@ -83,7 +99,7 @@ def restore(model: BaseAlgorithm, folder: Path) -> None:
     for name, value in (variables or {}).items():
         # As in BaseAlgorithm.load(): the optimizer of a variable refers to it.
         recursive_setattr(model, f"{name}.data", value.data)
-    for name, value in state_of(folder).items():
+    for name, value in state.items():
         if name in _COUNTERS:
             setattr(model, name, value)
     if (env := model.get_vec_normalize_env()) is not None:

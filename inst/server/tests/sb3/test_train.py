@@ -122,3 +122,7 @@ def test_a_training_goes_on_with_its_weights_steps_and_buffer(tmp_path, child):
     assert (result["begun"], result["steps"]) == (200, 300)
     with np.load(tmp_path / "checkpoint" / "buffer.npz") as buffer:
         assert len(buffer["rewards"]) == 300
+    (tmp_path / "checkpoint" / "model.zip").write_bytes(b"half of it")
+    said = child(error_of_training, tmp_path, **changes, total_steps=400)
+    assert "is damaged" in said["message"]
+    assert said["checkpoint"]
