@@ -80,14 +80,12 @@ agent_ars <- function(directions = 8, top = max(1, directions %/% 2), step_size 
 agent_start.gym_agent_ars <- function(agent, policy) {
   agent <- NextMethod()
   if (startsWith(agent$version, "V2")) {
-    if (inherits(policy$observation_space, "gym_space_discrete")) {
-      abort_wrong(
-        "version", agent$version, NULL,
-        "ARS {agent$version} normalizes observations, and those of {env_text(policy)} are
-         {format(policy$observation_space)}.",
-        i = '`version = "{sub("V2", "V1", agent$version)}"` takes them as they are.'
-      )
-    }
+    abort_if(
+      inherits(policy$observation_space, "gym_space_discrete"), "version", agent$version, NULL,
+      "ARS {agent$version} normalizes observations, and those of {env_text(policy)} are
+       {format(policy$observation_space)}.",
+      i = '`version = "{sub("V2", "V1", agent$version)}"` takes them as they are.'
+    )
     if (is.null(policy$moments)) {
       agent$policy$moments <- no_moments()
       # The paper's policy is linear in the normalised observations.

@@ -18,12 +18,10 @@ replay_bandit <- function(data, method, confidence, seed, call) {
     replay_steps(x, steps, if (length(used)) used else 1, method == "thompson", confidence)
   )
   seen <- length(played$reward)
-  if (!seen) {
-    abort_wrong(
-      "env", data, call, "The learner never chose the action of the data.",
-      i = "There are too few rows for so many actions, or too unequal probabilities."
-    )
-  }
+  abort_if(
+    !seen, "env", data, call, "The learner never chose the action of the data.",
+    i = "There are too few rows for so many actions, or too unequal probabilities."
+  )
   label <- paste0(if (method == "linucb") "LinUCB" else "linear Thompson sampling",
                   ", confidence ", number_text(confidence))
   structure(

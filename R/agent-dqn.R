@@ -89,22 +89,19 @@ dqn_log <- c("loss", "n_updates", "exploration_rate", "learning_rate")
 agent_start.gym_agent_dqn <- function(agent, policy) {
   agent <- NextMethod()
   space <- policy$action_space
-  if (!inherits(space, "gym_space_discrete")) {
-    abort_wrong(
-      "env", NULL, NULL,
-      "DQN learns a value for each action of a Discrete space, but the actions of
-       {env_text(policy)} are of {format(space)}.",
-      i = "Use `agent_ppo()` for these actions."
-    )
-  }
-  if (!identical(policy$output, "epsilon-greedy") || utils::tail(policy$sizes, 1L) != space$n) {
-    abort_wrong(
-      "policy", policy, NULL,
-      'DQN needs a network with a value for each of {count_of(space$n, "action")} and the output
-       "epsilon-greedy", not {format(policy)}.',
-      i = '`policy_network(c(NA, 64, 64, NA), output = "epsilon-greedy")` is one.'
-    )
-  }
+  abort_if(
+    !inherits(space, "gym_space_discrete"), "env", NULL, NULL,
+    "DQN learns a value for each action of a Discrete space, but the actions of
+     {env_text(policy)} are of {format(space)}.",
+    i = "Use `agent_ppo()` for these actions."
+  )
+  abort_if(
+    !identical(policy$output, "epsilon-greedy") || utils::tail(policy$sizes, 1L) != space$n,
+    "policy", policy, NULL,
+    'DQN needs a network with a value for each of {count_of(space$n, "action")} and the output
+     "epsilon-greedy", not {format(policy)}.',
+    i = '`policy_network(c(NA, 64, 64, NA), output = "epsilon-greedy")` is one.'
+  )
   agent$target <- weight_vector(policy)
   agent$adam <- new_adam(count_weights(policy))
   agent$updates <- agent$carried <- 0

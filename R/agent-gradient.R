@@ -14,22 +14,20 @@ new_gradient_agent <- function(class, settings, log) {
 #' @export
 agent_start.gym_agent_gradient <- function(agent, policy) {
   space <- policy$observation_space
-  if (length(space$shape) > 1L) {
-    abort_wrong(
-      "env", NULL, NULL,
-      "Agents that follow gradients need observations that are vectors; those of
-       {env_text(policy)} are of {format(space)}.",
-      i = if (startsWith(policy$env_id %||% "", "ALE/")) {
-        '`obs_type = "ram"` observes the memory, 128 numbers, as in `learn_ppo("{policy$env_id}",
-         obs_type = "ram", total_steps = 1e6)`.'
-      },
-      i = if (length(space$shape) == 3L) {
-        '`env <- gym_wrap(gym_wrap(env, "GrayscaleObservation"), "ResizeObservation",
-         shape = c(32, 32))` makes small grey pictures.'
-      },
-      i = '`gym_wrap(env, "FlattenObservation")` makes vectors, with which it can learn.'
-    )
-  }
+  abort_if(
+    length(space$shape) > 1L, "env", NULL, NULL,
+    "Agents that follow gradients need observations that are vectors; those of
+     {env_text(policy)} are of {format(space)}.",
+    i = if (startsWith(policy$env_id %||% "", "ALE/")) {
+      '`obs_type = "ram"` observes the memory, 128 numbers, as in `learn_ppo("{policy$env_id}",
+       obs_type = "ram", total_steps = 1e6)`.'
+    },
+    i = if (length(space$shape) == 3L) {
+      '`env <- gym_wrap(gym_wrap(env, "GrayscaleObservation"), "ResizeObservation",
+       shape = c(32, 32))` makes small grey pictures.'
+    },
+    i = '`gym_wrap(env, "FlattenObservation")` makes vectors, with which it can learn.'
+  )
   agent <- NextMethod()
   agent$iteration <- 0L
   agent$steps <- 0
@@ -49,8 +47,8 @@ default_policy.gym_agent_gradient <- function(agent) {
   policy_network(c(NA, 64, 64, NA), bias = TRUE, output = NA, init = "orthogonal")
 }
 
-# Observations are normalised from the first step of learning. Random episodes supply the first
-# moments; a policy that got them later would change at a stroke.
+# Observations are normalised from the first step of learning, with the moments of random episodes.
+# Moments that came later would change the policy at once.
 warm_up_episodes <- 8L
 
 is_warming_up <- function(agent) identical(agent$policy$moments$count, 0)

@@ -48,24 +48,20 @@ agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL
                               target_policy = NULL) {
   call <- rlang::current_env()
   importance <- check_choice(importance[1L], c("none", "weighted", "ordinary"), "importance", call)
-  if (importance == "none" && !is.null(target_policy)) {
-    abort_wrong(
-      "target_policy", target_policy, call,
-      "`target_policy` needs `importance`, because another policy plays the episodes."
-    )
-  }
+  abort_if(
+    importance == "none" && !is.null(target_policy), "target_policy", target_policy, call,
+    "`target_policy` needs `importance`, because another policy plays the episodes."
+  )
   if (!is.null(target_policy) && !inherits(target_policy, "gym_policy_table")) {
     must <- "a table, whose probabilities are known, or NULL"
     abort_argument(target_policy, must, "target_policy", call)
   }
   explores_else <- !is.null(temperature) || isTRUE(exploring_starts) || !is.null(learning_rate)
-  if (importance != "none" && explores_else) {
-    abort_wrong(
-      "importance", importance, call,
-      "`importance` works with `epsilon` only: leave out `temperature`, `exploring_starts` and
-       `learning_rate`."
-    )
-  }
+  abort_if(
+    importance != "none" && explores_else, "importance", importance, call,
+    "`importance` works with `epsilon` only: leave out `temperature`, `exploring_starts` and
+     `learning_rate`."
+  )
   visits <- check_choice(visits[1L], c("first", "every"), arg = "visits")
   check_flag(exploring_starts)
   settings <- list(

@@ -76,18 +76,14 @@ agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tempera
   settings <- mget(names(formals()))
   settings$planning <- as.integer(planning)
   check_learner(settings)
-  if (bonus > 0 && planning == 0) {
-    abort_wrong(
-      "bonus", bonus, rlang::current_env(),
-      "`bonus` is added to the rewards of planning: give `planning`, too."
-    )
-  }
-  if (planning > 0 && (double || !is.null(features))) {
-    abort_wrong(
-      "planning", planning, rlang::current_env(),
-      "`planning` is for a single table, not for features or double Q-learning."
-    )
-  }
+  abort_if(
+    bonus > 0 && planning == 0, "bonus", bonus, rlang::current_env(),
+    "`bonus` is added to the rewards of planning: give `planning`, too."
+  )
+  abort_if(
+    planning > 0 && (double || !is.null(features)), "planning", planning, rlang::current_env(),
+    "`planning` is for a single table, not for features or double Q-learning."
+  )
   new_learner("gym_agent_q", settings)
 }
 
@@ -244,12 +240,11 @@ learn_q <- function(env, ...) {
   given <- list(...)
   # Nobody acts while a table is learned from data, so most arguments have no meaning.
   unfit <- setdiff(rlang::names2(given), c("discount", "double", "iterations"))
-  if (length(unfit)) {
-    abort_wrong(
-      unfit[[1L]], NULL, call, "From data `learn_q()` has no argument `{unfit[[1L]]}`.",
-      i = "It has `discount`, `double` and `iterations`."
-    )
-  }
+  abort_if(
+    length(unfit),
+    unfit[[1L]], NULL, call, "From data `learn_q()` has no argument `{unfit[[1L]]}`.",
+    i = "It has `discount`, `double` and `iterations`."
+  )
   discount <- given[["discount"]] %||% 0.99
   double <- given[["double"]] %||% FALSE
   iterations <- given[["iterations"]]

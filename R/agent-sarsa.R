@@ -41,12 +41,10 @@ agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tem
 }
 
 check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {
-  if (n > 1 && lambda > 0) {
-    abort_wrong(
-      "lambda", lambda, call,
-      "Either `n` is above 1 or `lambda` above 0, not both: each says how far to look ahead."
-    )
-  }
+  abort_if(
+    n > 1 && lambda > 0, "lambda", lambda, call,
+    "Either `n` is above 1 or `lambda` above 0, not both: each says how far to look ahead."
+  )
 }
 
 #' @exportS3Method

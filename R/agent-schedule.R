@@ -48,9 +48,9 @@ new_schedule <- function(from, to, duration, f) {
 
 #' @export
 print.gym_schedule <- function(x, ...) {
-  cat("<schedule: from ", number_text(attr(x, "from")), " to ", number_text(attr(x, "to")), " in ",
-      count_of(attr(x, "duration"), "step"), ">\n", sep = "")
-  invisible(x)
+  print_lines(x, paste0("<schedule: from ", number_text(attr(x, "from")), " to ",
+                        number_text(attr(x, "to")), " in ", count_of(attr(x, "duration"), "step"),
+                        ">"))
 }
 
 # Inside of learners ------------------------------------------------------------------------

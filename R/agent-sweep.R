@@ -130,39 +130,33 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
     must <- "the function that makes the agent, such as `agent_ars` without parentheses"
     abort_argument(agent, must, "agent", call)
   }
-  if ("env" %in% names(formals(agent))) {
-    abort_wrong(
-      "agent", agent, call,
-      "`agent` must be the function that makes the agent, not one that trains it.",
-      i = "Give `agent_ars` instead of `search_ars`, `agent_ppo` instead of `learn_ppo`."
-    )
-  }
+  abort_if(
+    "env" %in% names(formals(agent)), "agent", agent, call,
+    "`agent` must be the function that makes the agent, not one that trains it.",
+    i = "Give `agent_ars` instead of `search_ars`, `agent_ppo` instead of `learn_ppo`."
+  )
   check_given(settings, "`expand.grid(step_size = c(0.02, 0.1))` has a row for each.", call = call)
   if (!is.data.frame(settings) || !nrow(settings) || !length(settings)) {
     abort_argument(settings, "a data frame with a row for each setting", "settings", call)
   }
   known <- names(formals(agent))
   unknown <- setdiff(names(settings), known)
-  if (length(unknown) && !"..." %in% known) {
-    abort_wrong(
-      "settings", unknown, call,
-      "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
-      i = "{did_you_mean(unknown[[1L]], known)}", i = "It has {quoted_names(known)}."
-    )
-  }
+  abort_if(
+    length(unknown) && !"..." %in% known, "settings", unknown, call,
+    "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
+    i = "{did_you_mean(unknown[[1L]], known)}", i = "It has {quoted_names(known)}."
+  )
   check_given(seeds, "They are the seeds for tuning, such as `1:10`.", call = call)
   check_seeds(seeds, call)
   check_string(folder, allow_null = TRUE, arg = "folder", call = call)
   if (!is.null(report_seeds)) {
     check_seeds(report_seeds, call)
     both <- intersect(seeds, report_seeds)
-    if (length(both)) {
-      abort_wrong(
-        "report_seeds", report_seeds, call,
-        "Seed {both[[1L]]} is one of `seeds` and of `report_seeds`.",
-        i = "What is reported must come from seeds that chose nothing."
-      )
-    }
+    abort_if(
+      length(both), "report_seeds", report_seeds, call,
+      "Seed {both[[1L]]} is one of `seeds` and of `report_seeds`.",
+      i = "What is reported must come from seeds that chose nothing."
+    )
   }
 }
 
@@ -287,7 +281,7 @@ as.data.frame.gym_sweep <- function(x, row.names = NULL, optional = FALSE, ...) 
 #' @export
 print.gym_sweep <- function(x, ...) {
   failed <- x$runs[!is.na(x$runs$error), ]
-  cat(
+  print_lines(x, c(
     paste0("Sweep of ", count_of(nrow(x$settings), "setting"),
            if (x$interrupted) ", interrupted: the same call goes on where it has a folder"),
     paste0("Tuning seeds: ", numbers_text(x$seeds),
@@ -303,10 +297,8 @@ print.gym_sweep <- function(x, ...) {
         paste0("  ", trainings_lines(x$reported)[-(1:2)]))
     } else if (!is.null(x$best)) {
       "No reporting seeds: for the best setting these figures are too good, see `report_seeds`"
-    },
-    sep = "\n"
-  )
-  invisible(x)
+    }
+  ))
 }
 
 # "1 to 5", or all of them.

@@ -45,11 +45,10 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
       abort_argument(get(arg), must, arg, call)
     }
   }
-  if (!is.null(behavior) && (n > 1 || lambda > 0)) {
-    abort_wrong(
-      "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
-    )
-  }
+  abort_if(
+    !is.null(behavior) && (n > 1 || lambda > 0),
+    "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
+  )
   settings <- list(
     plays = behavior %||% policy, learns = if (!is.null(behavior)) policy, discount = discount,
     learning_rate = learning_rate, initial = initial,

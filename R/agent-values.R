@@ -46,13 +46,11 @@ check_learner <- function(settings, call = rlang::caller_env()) {
 
 #' @export
 agent_start.gym_value_learner <- function(agent, policy) {
-  if (!inherits(policy$action_space, "gym_space_discrete")) {
-    abort_wrong(
-      "env", NULL, NULL,
-      "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
-      i = "`search_ars()` and `search_cem()` learn actions of a Box."
-    )
-  }
+  abort_if(
+    !inherits(policy$action_space, "gym_space_discrete"), "env", NULL, NULL,
+    "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
+    i = "`search_ars()` and `search_cem()` learn actions of a Box."
+  )
   agent$spaces <- policy[c("observation_space", "action_space")]
   agent$basis <- basis_of(agent$features, policy$observation_space, NULL)
   agent$taken <- 0
@@ -68,12 +66,10 @@ value_columns_of <- function(agent) {
 
 first_weights <- function(agent, policy) {
   if (!is.null(policy$q)) {
-    if (!is.null(agent$features) || ncol(policy$q) != value_columns_of(agent)) {
-      abort_wrong(
-        "policy", policy, NULL,
-        "Only a learner of a table with a column for each action can start with a table."
-      )
-    }
+    abort_if(
+      !is.null(agent$features) || ncol(policy$q) != value_columns_of(agent), "policy", policy, NULL,
+      "Only a learner of a table with a column for each action can start with a table."
+    )
     weights <- policy$q
   } else if (is.na(agent$basis$count)) {
     # The user's function has not been called yet.

@@ -37,17 +37,13 @@ policy_candidates <- function(policy, weights) {
     )
   }
   count <- count_weights(policy)
-  if (ncol(weights) != count) {
-    abort_wrong(
-      "weights", weights, call,
-      '`weights` must have the {count_of(count, "weight")} of a candidate in each row, one a
-       column, not {count_of(ncol(weights), "column")}.',
-      i = if (nrow(weights) == count) "`t(weights)` has a candidate in each row."
-    )
-  }
-  if (anyNA(weights)) {
-    abort_argument(weights, "without missing values", "weights", call)
-  }
+  abort_if(
+    ncol(weights) != count, "weights", weights, call,
+    '`weights` must have the {count_of(count, "weight")} of a candidate in each row, one a
+     column, not {count_of(ncol(weights), "column")}.',
+    i = if (nrow(weights) == count) "`t(weights)` has a candidate in each row."
+  )
+  check_that(!anyNA(weights), weights, "without missing values", "weights", call)
   storage.mode(weights) <- "double"
   new_candidates(policy, weights)
 }

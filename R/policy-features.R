@@ -52,10 +52,7 @@ format.gym_features <- function(x, ...) {
 }
 
 #' @export
-print.gym_features <- function(x, ...) {
-  cat("<features: ", format(x), ">\n", sep = "")
-  invisible(x)
-}
+print.gym_features <- function(x, ...) print_lines(x, paste0("<features: ", format(x), ">"))
 
 # What values are linear in -----------------------------------------------------------
 
@@ -80,15 +77,13 @@ basis_of <- function(features, space, call) {
   if (is.function(features)) {
     of <- function(observation, n) {
       values <- plain_numbers(features(observation), "features", call)
-      if (!is.matrix(values) || !(is.numeric(values) || is.logical(values)) ||
-            nrow(values) != n || !all(is.finite(values))) {
-        abort_wrong(
-          "features", values, call,
-          '`features` must return a numeric matrix with a row for each of
-           {count_of(n, "observation")}, not {describe_argument(values)}.',
-          i = "It gets many observations at once, as a policy does; see `act()`."
-        )
-      }
+      abort_if(
+        !is.matrix(values) || !(is.numeric(values) || is.logical(values)) || nrow(values) != n ||
+          !all(is.finite(values)), "features", values, call,
+        '`features` must return a numeric matrix with a row for each of
+         {count_of(n, "observation")}, not {describe_argument(values)}.',
+        i = "It gets many observations at once, as a policy does; see `act()`."
+      )
       values
     }
     one <- function(observation) of(observation, 1L)[1L, ]
@@ -109,27 +104,23 @@ tiles_of <- function(features, space, call) {
   low <- rep_len(features$low %||% range$low, numbers)
   high <- rep_len(features$high %||% range$high, numbers)
   unbounded <- !is.finite(low) | !is.finite(high) | low >= high
-  if (any(unbounded)) {
-    abort_wrong(
-      "features", features, call,
-      "Number {which(unbounded)[[1L]]} of an observation has no range: its bounds are
-       {low[unbounded][[1L]]} and {high[unbounded][[1L]]}.",
-      i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."
-    )
-  }
+  abort_if(
+    any(unbounded), "features", features, call,
+    "Number {which(unbounded)[[1L]]} of an observation has no range: its bounds are
+     {low[unbounded][[1L]]} and {high[unbounded][[1L]]}.",
+    i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."
+  )
   bins <- rep_len(features$bins, numbers)
   tilings <- features$tilings
   # One tile more than bins, because all grids but the first are shifted.
   weights <- c(1, cumprod(bins + 1))
   per_tiling <- weights[[numbers + 1L]]
-  if (per_tiling * tilings > most_values) {
-    abort_wrong(
-      "features", features, call,
-      "The tilings would have {whole_number_text(per_tiling * tilings)} tiles; at most
-       {whole_number_text(most_values)} are possible.",
-      i = "Take fewer `bins`, or features of your own, of fewer numbers."
-    )
-  }
+  abort_if(
+    per_tiling * tilings > most_values, "features", features, call,
+    "The tilings would have {whole_number_text(per_tiling * tilings)} tiles; at most
+     {whole_number_text(most_values)} are possible.",
+    i = "Take fewer `bins`, or features of your own, of fewer numbers."
+  )
   width <- (high - low) / bins
   last <- bins * (1 - 1e-12)
   # A column for each tiling.
@@ -169,13 +160,11 @@ tiled_range <- function(space, features, call) {
   if (inherits(space, "gym_space_discrete")) {
     return(list(low = as.double(space$start), high = as.double(space$start) + as.double(space$n)))
   }
-  if (!inherits(space, "gym_space_box") || length(space$shape) != 1L) {
-    abort_wrong(
-      "features", features, call,
-      "Tiles are for observations that are Discrete or a Box of one dimension, not
-       {format(space)}."
-    )
-  }
+  abort_if(
+    !inherits(space, "gym_space_box") || length(space$shape) != 1L, "features", features, call,
+    "Tiles are for observations that are Discrete or a Box of one dimension, not
+     {format(space)}."
+  )
   list(low = as.numeric(space$low), high = as.numeric(space$high))
 }
 

@@ -3,12 +3,11 @@
 check_takes_observations <- function(policy, arg, call) {
   # args() is NULL for the few primitives that take any arguments.
   declared <- args(policy)
-  if (!is.null(declared) && !length(formals(declared))) {
-    abort_wrong(
-      arg, policy, call, "`{arg}` must be a function of observations; this one has no argument.",
-      i = "An example: `function(observation) as.integer(observation[, 3] > 0)`."
-    )
-  }
+  abort_if(
+    !is.null(declared) && !length(formals(declared)),
+    arg, policy, call, "`{arg}` must be a function of observations; this one has no argument.",
+    i = "An example: `function(observation) as.integer(observation[, 3] > 0)`."
+  )
 }
 
 #' Call a function with one observation before the first step
@@ -110,5 +109,194 @@ actions_hint <- function(space) {
     } else {
       "several are a matrix."
     })
+  }
+}
+
+# With a memory --------------------------------------------------------------------------
+
+# Policies with a memory: earlier observations or actions influence the next action.
+#
+# The package keeps the memory, a row for each sub-environment. Episodes that are played together do
+# not share it, and each episode starts with the same one.
+
+#' Make a policy with a memory
+#'
+#' Make a policy that uses earlier observations: a PID controller, a moving average, a small
+#' recurrent network. The package keeps one memory for each episode and starts every episode with
+#' `initial`, so episodes never share a memory, even if they are played together.
+#'
+#' Such a policy always plays step by step from R. It works everywhere that [rollout()] and
+#' [evaluate_policy()] play: environments on a server, [environments in R][gym_env()], workers, and
+#' in a list with other policies. [saveRDS()] saves it like a function.
+#'
+#' A plain function that remembers something by `<<-` does not work. [rollout()] passes it several
+#' episodes in one call, and a new episode would start with the memory of another.
+#'
+#' @param act A function of `observation` and `memory`. `observation` has many observations, as for
+#'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows.
+#'   It is a matrix if `initial` is a vector, and a data frame if `initial` is a list or a data
+#'   frame. The function returns `list(action = , memory = )`: an action for each observation, and
+#'   the new memory with the same rows and columns.
+#' @param initial The memory at the start of an episode: a numeric vector (its names become column
+#'   names), or a list or data frame of one row.
+#' @return A policy of class `gym_policy_memory`. `act(policy, observation, memory)` returns the
+#'   list that the function returns; without `memory` it starts with `initial`.
+#' @section Errors: `gym_error_argument` for an invalid `act` or `initial`, and, while it is played,
+#'   if `act` does not return the list described above.
+#' @export
+#' @examples
+#' # A PID controller that holds the pole of CartPole upright.
+#' pid <- policy_memory(
+#'   function(observation, memory) {
+#'     error <- observation[, 3]
+#'     sum <- memory[, "sum"] + error
+#'     push <- 1 * error + 0.01 * sum + 10 * (error - memory[, "error"])
+#'     list(action = as.integer(push > 0), memory = cbind(error = error, sum = sum))
+#'   },
+#'   initial = c(error = 0, sum = 0)
+#' )
+#'
+#' # By hand: the memory goes from one call to the next.
+#' first <- act(pid, c(0, 0, 0.02, 0))
+#' act(pid, c(0, 0, 0.01, 0), first$memory)
+#' @examplesIf gym:::can_start_server()
+#'
+#' evaluate_policy("CartPole-v1", pid, episodes = 20, seed = 1)
+policy_memory <- function(act, initial) {
+  call <- rlang::current_env()
+  must <- "a function of `observation` and `memory`"
+  check_that(is.function(act), act, must, "act", call)
+  takes <- names(formals(args(act)))
+  if (!"..." %in% takes && length(takes) < 2L) {
+    alone <- if (length(takes)) paste0("`", takes, "` alone") else "nothing"
+    abort_wrong("act", act, call, "`act` must be {must}, not of {alone}.")
+  }
+  check_given(initial, "It is the memory at the start of an episode, such as `c(sum = 0)`.")
+  # A matrix or a data frame of one row.
+  memory <- if (is.list(initial)) {
+    tryCatch(
+      as.data.frame(initial, stringsAsFactors = FALSE, optional = TRUE),
+      error = function(cnd) NULL
+    )
+  } else if (is.vector(initial)) {
+    matrix(initial, nrow = 1L, dimnames = if (!is.null(names(initial))) list(NULL, names(initial)))
+  } else {
+    initial
+  }
+  if (!length(memory) || !identical(nrow(memory), 1L)) {
+    must <- "the memory of one episode: a vector, or a list or data frame of one row"
+    abort_argument(initial, must, "initial", call)
+  }
+  structure(list(act = act, initial = memory), class = c("gym_policy_memory", "gym_policy"))
+}
+
+#' @export
+format.gym_policy_memory <- function(x, ...) {
+  kept <- colnames(x$initial) %||% count_of(ncol(x$initial), "value")
+  paste("a function with a memory of", sub("(.*), ", "\\1 and ", toString(kept)))
+}
+
+#' @rdname act
+#' @param memory For a [policy with a memory][policy_memory()]: the `memory` that it returned in the
+#'   previous step.
+#' @export
+act.gym_policy_memory <- function(policy, observation, memory = NULL, ...) {
+  observation <- function_rows(observation)
+  n <- if (is.array(observation)) nrow(observation)
+  memory <- memory %||% fresh_memory(policy, n %||% 1L)
+  asked_with_memory(policy, observation, memory, rlang::current_env())
+}
+
+fresh_memory <- function(policy, n) policy$initial[rep(1L, n), , drop = FALSE]
+
+# Calls the function and checks its result.
+asked_with_memory <- function(policy, observation, memory, call) {
+  said <- policy$act(observation, memory)
+  new <- if (is.list(said)) said[["memory"]]
+  if (is.null(new) || is.null(said[["action"]])) {
+    abort_memory(said, "a list of `action` and `memory`", call)
+  }
+  same <- identical(dim(new), dim(memory)) && is.data.frame(new) == is.data.frame(memory) &&
+    (is.null(colnames(memory)) || identical(colnames(new), colnames(memory)))
+  if (!same) {
+    must <- paste0(
+      "a `memory` of ", size_text(memory), ", as it was given",
+      if (!is.null(colnames(memory))) paste0(" (", toString(colnames(memory)), ")")
+    )
+    abort_memory(new, must, call)
+  }
+  said[c("action", "memory")]
+}
+
+size_text <- function(memory) {
+  paste(count_of(nrow(memory), "row"), "and", count_of(ncol(memory), "column"))
+}
+
+abort_memory <- function(value, must, call) {
+  abort_wrong(
+    "policy", value, call,
+    "`act` of a policy with a memory must return {must}, not
+     {if (length(dim(value)) == 2L) size_text(value) else describe_argument(value)}.",
+    i = "An example: `list(action = as.integer(push > 0), memory = cbind(error, sum))`."
+  )
+}
+
+# While it plays ---------------------------------------------------------------------------
+
+#' Give each sub-environment of a batch a memory
+#' @return The policy. One with a memory gets `kept`, an environment with the `memory` of all
+#'   sub-environments.
+#' @noRd
+with_memory <- function(policy, num_envs) {
+  if (inherits(policy, "gym_policy_list")) {
+    policy_list(lapply(unclass(policy), with_memory, num_envs))
+  } else if (inherits(policy, "gym_policy_memory")) {
+    policy$kept <- rlang::env(memory = fresh_memory(policy, num_envs))
+    policy
+  } else {
+    policy
+  }
+}
+
+# Episodes start in these sub-environments.
+begin_memory <- function(policy, sub_env) {
+  if (inherits(policy, "gym_policy_list")) {
+    lapply(unclass(policy), begin_memory, sub_env)
+  } else if (inherits(policy, "gym_policy_memory")) {
+    policy$kept$memory[sub_env, ] <- fresh_memory(policy, length(sub_env))
+  }
+}
+
+#' @exportS3Method
+policy_rows.gym_policy_memory <- function(policy, candidate, sub_env) {
+  policy$sub_env <- sub_env
+  policy
+}
+
+#' @exportS3Method
+act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
+  kept <- policy$kept
+  abort_if(
+    is.null(kept), "policy", policy, vector_env$call,
+    "The policy has a memory, so its actions do not depend on the observation alone.",
+    i = "`rollout()` plays it, which keeps the memory of each episode."
+  )
+  rows <- policy$sub_env
+  said <- asked_with_memory(
+    policy, observation, kept$memory[rows, , drop = FALSE], vector_env$call
+  )
+  kept$memory[rows, ] <- said$memory
+  batch_actions(said$action, n, vector_env)
+}
+
+# How to reach a number of the memory.
+memory_form <- function(initial) {
+  name <- colnames(initial)[1L]
+  if (is.data.frame(initial)) {
+    paste0("`memory` is a data frame with a row for each episode, such as `memory$", name, "`.")
+  } else {
+    place <- if (is.null(name)) "1" else paste0("\"", name, "\"")
+    paste0("`memory` is a matrix with a row for each episode: `memory[, ", place,
+           "]`. With a list as `initial` it is a data frame.")
   }
 }

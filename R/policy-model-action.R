@@ -157,15 +157,13 @@ response_numbers <- function(policy) {
 check_labels <- function(policy, space, env_id, call) {
   numbers <- as.character(state_numbers(space))
   strange <- setdiff(policy$labels, c(numbers, action_meaning(env_id, space$n)))
-  if (length(strange)) {
-    abort_wrong(
-      "policy", policy, call,
-      "The levels of the model's response, {quoted_names(policy$labels)}, must be actions;
-       {quoted_names(strange)} {if (length(strange) > 1L) 'are' else 'is'} none.",
-      i = "{actions_text(env_id, space)}",
-      i = "`glm(factor(action) ~ ..., binomial)` is fitted to their numbers."
-    )
-  }
+  abort_if(
+    length(strange), "policy", policy, call,
+    "The levels of the model's response, {quoted_names(policy$labels)}, must be actions;
+     {quoted_names(strange)} {if (length(strange) > 1L) 'are' else 'is'} none.",
+    i = "{actions_text(env_id, space)}",
+    i = "`glm(factor(action) ~ ..., binomial)` is fitted to their numbers."
+  )
 }
 
 actions_text <- function(env_id, space) {

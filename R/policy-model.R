@@ -82,16 +82,14 @@ as_policy.default <- function(x, ..., predict = NULL) {
   call <- rlang::current_env()
   arguments <- list(...)
   known <- if (is.null(predict)) model_defaults(x, arguments$type, call)
-  if (is.null(predict) && is.null(known)) {
-    abort_wrong(
-      "x", x, call,
-      "`x` must be a policy, a function of observations or a model of `lm()`, `glm()`,
-       `rpart::rpart()` or `nnet::nnet()`, not {describe_argument(x)}.",
-      i = if (is.object(x)) {
-        "For another model, give `predict = function(model, newdata) ...`, which returns actions."
-      }
-    )
-  }
+  abort_if(
+    is.null(predict) && is.null(known), "x", x, call,
+    "`x` must be a policy, a function of observations or a model of `lm()`, `glm()`,
+     `rpart::rpart()` or `nnet::nnet()`, not {describe_argument(x)}.",
+    i = if (is.object(x)) {
+      "For another model, give `predict = function(model, newdata) ...`, which returns actions."
+    }
+  )
   if (!is.null(predict) && !is.function(predict)) {
     abort_argument(predict, "a function of the model and a data frame", "predict", call)
   }
@@ -139,13 +137,11 @@ model_defaults <- function(model, type, call) {
     labels <- if (identical(model$family$family, "binomial")) {
       levels(stats::model.frame(model)[[1L]])
     }
-    if (length(labels) > 2L) {
-      abort_wrong(
-        "x", model, call,
-        "A binomial model tells two actions apart, but its response has {length(labels)} levels.",
-        i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."
-      )
-    }
+    abort_if(
+      length(labels) > 2L, "x", model, call,
+      "A binomial model tells two actions apart, but its response has {length(labels)} levels.",
+      i = "`rpart::rpart()` and `nnet::multinom()` tell more of them apart."
+    )
     list(type = type, labels = if (type == "response") labels)
   } else if (inherits(model, "lm")) {
     list(type = type)
@@ -168,14 +164,12 @@ format.gym_policy_model <- function(x, ...) {
 #' @exportS3Method
 policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()) {
   actions <- env$action_space
-  if (!inherits(actions, c("gym_space_discrete", "gym_space_box"))) {
-    abort_wrong(
-      "policy", policy, call,
-      "A model cannot choose from {format(actions)} of {environment_label(env)}.",
-      i = "It can predict discrete actions and those of a Box; a function of observations can put
-           several predictions together."
-    )
-  }
+  abort_if(
+    !inherits(actions, c("gym_space_discrete", "gym_space_box")), "policy", policy, call,
+    "A model cannot choose from {format(actions)} of {environment_label(env)}.",
+    i = "It can predict discrete actions and those of a Box; a function of observations can put
+         several predictions together."
+  )
   load_model_package(policy, call)
   if (inherits(actions, "gym_space_discrete")) check_response(policy, actions, env$spec$id, call)
   policy$observation_space <- env$observation_space
@@ -249,13 +243,11 @@ takes_table <- function(policy) {
 }
 
 check_was_played <- function(policy, call) {
-  if (is.null(policy$action_space)) {
-    abort_wrong(
-      "policy", policy, call,
-      "The model does not know the observations and actions of an environment.",
-      i = "Play it with `rollout()`: the policy in what that returns knows the environment."
-    )
-  }
+  abort_if(
+    is.null(policy$action_space), "policy", policy, call,
+    "The model does not know the observations and actions of an environment.",
+    i = "Play it with `rollout()`: the policy in what that returns knows the environment."
+  )
 }
 
 #' Get a model's predictions for observations

@@ -60,14 +60,12 @@ check_inputs <- function(policy, env, call) {
     abort_fit(policy, paste("A network cannot observe", format(space)), env, call)
   }
   discrete <- inherits(space, "gym_space_discrete")
-  if (!is.null(policy$moments) && discrete) {
-    abort_wrong(
-      "policy", policy, call,
-      "Observations that are numbers of a range can be normalized, but those of
-       {environment_label(env)} are {format(space)}.",
-      i = "Make the policy with `normalize = FALSE`."
-    )
-  }
+  abort_if(
+    !is.null(policy$moments) && discrete, "policy", policy, call,
+    "Observations that are numbers of a range can be normalized, but those of
+     {environment_label(env)} are {format(space)}.",
+    i = "Make the policy with `normalize = FALSE`."
+  )
   if (gives != inputs) {
     of_each <- if (discrete) {
       paste("is one of", gives, "and needs an input for each")
@@ -119,14 +117,12 @@ check_output_kind <- function(policy, space, env, call) {
     )
   }
   bounded <- discrete || all(is.finite(c(space$low, space$high)))
-  if (!bounded && has_range(policy)) {
-    abort_wrong(
-      "policy", policy, call,
-      'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
-       {environment_label(env)} takes {format(space)} with a side without a bound.',
-      i = 'Outputs of "identity" are taken as they are.'
-    )
-  }
+  abort_if(
+    !bounded && has_range(policy), "policy", policy, call,
+    'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
+     {environment_label(env)} takes {format(space)} with a side without a bound.',
+    i = 'Outputs of "identity" are taken as they are.'
+  )
 }
 
 # Names the sizes that would fit, with the same hidden layers.

@@ -119,13 +119,12 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   last <- if (identical(output, "greedy")) "logistic" else "identity"
   activation <- layer_activations(activation %||% c("tanh", last), sizes)
   last <- activation[[length(activation)]]
-  if (!identical(output, "greedy") && last != "identity") {
-    abort_wrong(
-      "activation", activation, rlang::current_env(),
-      'A network that draws its actions needs outputs of "identity", not of "{last}".',
-      i = '`activation = c("tanh", "identity")` has them.'
-    )
-  }
+  abort_if(
+    !identical(output, "greedy") && last != "identity",
+    "activation", activation, rlang::current_env(),
+    'A network that draws its actions needs outputs of "identity", not of "{last}".',
+    i = '`activation = c("tanh", "identity")` has them.'
+  )
   check_number(epsilon, min = 0, max = 1)
   policy <- new_network(sizes, activation, bias, normalize)
   policy$clip_obs <- clip_obs
@@ -141,13 +140,11 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   if (!anyNA(sizes)) policy <- with_deviations(policy)
   weights <- plain_numbers(weights)
   if (!is.null(weights)) {
-    if (anyNA(sizes)) {
-      abort_wrong(
-        "sizes", sizes, rlang::current_env(),
-        "`weights` are for given sizes, and `sizes` leaves some to the environment.",
-        i = "Give all sizes as numbers."
-      )
-    }
+    abort_if(
+      anyNA(sizes), "sizes", sizes, rlang::current_env(),
+      "`weights` are for given sizes, and `sizes` leaves some to the environment.",
+      i = "Give all sizes as numbers."
+    )
     check_weights(weights, sizes, bias)
     policy$weights <- weights
     policy

@@ -17,9 +17,7 @@ observation_rows <- function(observation, space, n = NULL, arg = "observation",
   # The number of dimensions of an observation: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
   observation <- numbers_by_name(observation, space, n, arg, call)
-  if (is.null(observation)) {
-    abort_argument(observation, "an observation", arg, call)
-  }
+  check_that(!is.null(observation), observation, "an observation", arg, call)
   if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
     must <- paste("one value of", format(space), "in each row instead of several")
     abort_argument(observation, must, arg, call)
@@ -133,15 +131,13 @@ places_by_name <- function(given, known, own, open, arg, call) {
   given[stands] <- known[of_own[stands]]
   absent <- setdiff(known, given)
   strange <- if (!open) c(setdiff(given, known), given[duplicated(given)])
-  if (length(absent) || length(strange)) {
-    abort_wrong(
-      arg, given, call,
-      '`{arg}` must have the names of the observations{
-       if (length(absent)) paste0("; it has no ", quoted_names(absent))}{
-       if (length(strange)) paste0("; it has ", quoted_names(unique(strange)))}.',
-      i = "Their names are {few_names(known)}.",
-      i = if (!open) "Without names, numbers are taken by position: `unname()` removes them."
-    )
-  }
+  abort_if(
+    length(absent) || length(strange), arg, given, call,
+    '`{arg}` must have the names of the observations{
+     if (length(absent)) paste0("; it has no ", quoted_names(absent))}{
+     if (length(strange)) paste0("; it has ", quoted_names(unique(strange)))}.',
+    i = "Their names are {few_names(known)}.",
+    i = if (!open) "Without names, numbers are taken by position: `unname()` removes them."
+  )
   match(known, given)
 }

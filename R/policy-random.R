@@ -43,12 +43,11 @@ random_discrete_agent <- function(n) {
 #' @export
 act.gym_policy_random <- function(policy, observation, ...) {
   space <- policy$action_space
-  if (is.null(space)) {
-    abort_wrong(
-      "policy", policy, rlang::current_env(), "The random policy has no action space.",
-      i = "Give one, as in `policy_random(env$action_space)`, or play it with `rollout()`."
-    )
-  }
+  abort_if(
+    is.null(space),
+    "policy", policy, rlang::current_env(), "The random policy has no action space.",
+    i = "Give one, as in `policy_random(env$action_space)`, or play it with `rollout()`."
+  )
   n <- count_observed(observation, policy$observation_space)
   if (is.null(n)) space_sample(space) else sample_batch(space, n)
 }
@@ -92,13 +91,11 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   } else {
     identical(class(own), class(all)) && identical(own$shape, all$shape)
   }
-  if (!within) {
-    abort_wrong(
-      "policy", policy, call,
-      "The policy's actions are {format(own)}, but {environment_label(env)} takes
-       {format(env$action_space)}."
-    )
-  }
+  abort_if(
+    !within, "policy", policy, call,
+    "The policy's actions are {format(own)}, but {environment_label(env)} takes
+     {format(env$action_space)}."
+  )
   policy
 }
 

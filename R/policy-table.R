@@ -65,7 +65,7 @@ act.gym_policy_table <- function(policy, observation, ...) {
   if (by_name) observation <- encoded_values(states_of(policy), observation, "state", NULL)
   observed <- observed_batch(observation, states_of(policy))
   actions <- act_batch(policy, observed$batch, observed$n, NULL)
-  # Whoever asks by name is answered by name.
+  # An observation given by name gets the name of its action.
   if (by_name) named_numbers(policy$action_space, actions) else actions
 }
 
@@ -98,13 +98,11 @@ table_rows <- function(policy, observation, n, call = rlang::caller_env()) {
   space <- states_of(policy)
   number <- rows_of_table(space_index(space), space, observation, n, call)
   rows <- policy$q[number, , drop = FALSE]
-  if (any(rows[, 1L] == -Inf) && any(row_max(rows) == -Inf)) {
-    abort_wrong(
-      "policy", policy, call,
-      "Row {number[row_max(rows) == -Inf][[1L]]} of the policy's table leaves no action: all its
-       values are -Inf."
-    )
-  }
+  abort_if(
+    any(rows[, 1L] == -Inf) && any(row_max(rows) == -Inf), "policy", policy, call,
+    "Row {number[row_max(rows) == -Inf][[1L]]} of the policy's table leaves no action: all its
+     values are -Inf."
+  )
   rows
 }
 
@@ -148,22 +146,18 @@ row_probabilities <- function(policy, rows) {
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {
   env <- one_sub_env(env)
   states <- table_index(env$observation_space, "observations", call)$count
-  if (!inherits(env$action_space, "gym_space_discrete")) {
-    abort_wrong(
-      "policy", policy, call,
-      "A table cannot have a column for each action of {format(env$action_space)}."
-    )
-  }
+  abort_if(
+    !inherits(env$action_space, "gym_space_discrete"), "policy", policy, call,
+    "A table cannot have a column for each action of {format(env$action_space)}."
+  )
   actions <- as.double(env$action_space$n)
-  if (nrow(policy$q) != states || ncol(policy$q) != actions) {
-    abort_wrong(
-      "policy", policy, call,
-      "The policy's table has {count_of(nrow(policy$q), 'row')} and
-       {count_of(ncol(policy$q), 'column')}, but {environment_label(env)} has
-       {count_of(states, 'state')} and {count_of(actions, 'action')}: a table has a row for each
-       state and a column for each action."
-    )
-  }
+  abort_if(
+    nrow(policy$q) != states || ncol(policy$q) != actions, "policy", policy, call,
+    "The policy's table has {count_of(nrow(policy$q), 'row')} and
+     {count_of(ncol(policy$q), 'column')}, but {environment_label(env)} has
+     {count_of(states, 'state')} and {count_of(actions, 'action')}: a table has a row for each
+     state and a column for each action."
+  )
   policy$observation_space <- env$observation_space
   policy$action_space <- env$action_space
   policy

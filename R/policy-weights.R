@@ -37,12 +37,11 @@ draw_first_weights <- function(policy) {
 # The user may have changed the weights. A network whose sizes depend on the environment has no
 # weights before it is bound.
 check_network <- function(policy, call = rlang::caller_env()) {
-  if (is.null(policy$weights)) {
-    abort_wrong(
-      "policy", policy, call, "The network does not know its sizes: {sizes_text(policy$sizes)}.",
-      i = "`policy_bind(policy, env)` takes them from the environment."
-    )
-  }
+  abort_if(
+    is.null(policy$weights),
+    "policy", policy, call, "The network does not know its sizes: {sizes_text(policy$sizes)}.",
+    i = "`policy_bind(policy, env)` takes them from the environment."
+  )
   check_weights(policy$weights, policy$sizes, policy$bias, "policy$weights", call)
 }
 
@@ -60,9 +59,7 @@ check_weights <- function(weights, sizes, bias = FALSE, name = "weights",
 }
 
 check_layer <- function(layer, wanted, bias, arg, call) {
-  if (!is.matrix(layer) || !is.numeric(layer)) {
-    abort_argument(layer, "a numeric matrix", arg, call)
-  }
+  check_that(is.matrix(layer) && is.numeric(layer), layer, "a numeric matrix", arg, call)
   if (!identical(dim(layer), as.integer(wanted))) {
     turned <- identical(rev(dim(layer)), as.integer(wanted))
     abort_wrong(
@@ -72,9 +69,7 @@ check_layer <- function(layer, wanted, bias, arg, call) {
       i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
     )
   }
-  if (anyNA(layer)) {
-    abort_argument(layer, "without missing values", arg, call)
-  }
+  check_that(!anyNA(layer), layer, "without missing values", arg, call)
 }
 
 # The weights as one vector, layer after layer, each matrix column after column, and then the
@@ -163,9 +158,7 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
     abort_argument(value, paste("a vector of", count_of(count, "number")), "value",
                    rlang::current_env())
   }
-  if (anyNA(value)) {
-    abort_argument(value, "without missing values", "value", rlang::current_env())
-  }
+  check_that(!anyNA(value), value, "without missing values", "value", rlang::current_env())
   with_weights(object, as.numeric(value))
 }
 

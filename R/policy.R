@@ -118,18 +118,14 @@ frame_rows <- function(x) {
 }
 
 #' @export
-print.gym_policy <- function(x, ...) {
-  cat("<policy: ", format(x), ">\n", sep = "")
-  invisible(x)
-}
+print.gym_policy <- function(x, ...) print_lines(x, paste0("<policy: ", format(x), ">"))
 
 check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
-  if (identical(x, policy_random) || identical(x, policy_network)) {
-    abort_wrong(
-      arg, x, call, "`{arg}` must be a policy, not the function that makes one.",
-      i = "Did you forget the parentheses, as in `policy_random()`?"
-    )
-  }
+  abort_if(
+    identical(x, policy_random) || identical(x, policy_network),
+    arg, x, call, "`{arg}` must be a policy, not the function that makes one.",
+    i = "Did you forget the parentheses, as in `policy_random()`?"
+  )
   if (!inherits(x, "gym_policy") && !is.function(x) && !has_method(x, "act")) {
     own <- class(x)[[1L]]
     abort_wrong(
@@ -156,9 +152,7 @@ check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   if (!is.list(x) || is.object(x)) {
     return(check_policy(x, arg, call))
   }
-  if (!length(x)) {
-    abort_argument(x, "a policy, or a list of at least one", arg, call)
-  }
+  check_that(length(x), x, "a policy, or a list of at least one", arg, call)
   x <- lapply(x, trained_policy)
   for (i in seq_along(x)) {
     check_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)
@@ -180,12 +174,11 @@ trained_policy <- function(x) {
 
 # Candidates are several policies, so they cannot be an element of a list.
 check_one_policy <- function(x, arg, call) {
-  if (!is.null(count_candidates(x))) {
-    abort_wrong(
-      arg, x, call, "`{arg}` must be one policy, not {policy_text(x)}.",
-      i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."
-    )
-  }
+  abort_if(
+    !is.null(count_candidates(x)),
+    arg, x, call, "`{arg}` must be one policy, not {policy_text(x)}.",
+    i = "Candidates are given alone: all weights go in one matrix to `policy_candidates()`."
+  )
 }
 
 # Is there a method of the generic function for the object's own class?

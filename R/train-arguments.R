@@ -14,13 +14,11 @@ check_training <- function(settings, call) {
   }
   check_number(settings$total_steps, min = 1, allow_null = TRUE, arg = "total_steps", call = call)
   check_number(settings$target, allow_null = TRUE, arg = "target", call = call)
-  if (is.numeric(settings$seed) && length(settings$seed) > 1L) {
-    abort_wrong(
-      "seed", settings$seed, call,
-      "`seed` is one whole number, not {length(settings$seed)} of them.",
-      i = "`seeds` trains once with each of several seeds."
-    )
-  }
+  abort_if(
+    is.numeric(settings$seed) && length(settings$seed) > 1L, "seed", settings$seed, call,
+    "`seed` is one whole number, not {length(settings$seed)} of them.",
+    i = "`seeds` trains once with each of several seeds."
+  )
   check_seed(settings$seed, arg = "seed", call = call)
   least <- c(iterations = 1, max_steps = 1, episodes = 1, eval_every = 1, eval_episodes_curve = 0,
              eval_episodes = 2)
@@ -42,25 +40,21 @@ check_training <- function(settings, call) {
 
 # Otherwise it would be taken for an argument of the environment.
 check_no_steps <- function(names, call) {
-  if ("steps" %in% names) {
-    abort_wrong(
-      "steps", NULL, call,
-      "The budget in steps of the environment is the argument `total_steps`, not `steps`.",
-      i = "For an environment with an argument `steps`, call `gym_make()` first."
-    )
-  }
+  abort_if(
+    "steps" %in% names, "steps", NULL, call,
+    "The budget in steps of the environment is the argument `total_steps`, not `steps`.",
+    i = "For an environment with an argument `steps`, call `gym_make()` first."
+  )
 }
 
 # Otherwise it, too, would be taken for one of the environment.
 check_not_of_agent <- function(names, of_agent, place, call) {
   own <- intersect(names, of_agent)
-  if (length(own)) {
-    abort_wrong(
-      own[[1L]], NULL, call,
-      "`{own[[1L]]}` is an argument of the agent: {sprintf(place, own[[1L]])}.",
-      i = "For an environment with an argument `{own[[1L]]}`, call `gym_make()` first."
-    )
-  }
+  abort_if(
+    length(own), own[[1L]], NULL, call,
+    "`{own[[1L]]}` is an argument of the agent: {sprintf(place, own[[1L]])}.",
+    i = "For an environment with an argument `{own[[1L]]}`, call `gym_make()` first."
+  )
 }
 
 # A misspelt argument would be taken for one of the environment. A name that only resembles another
@@ -68,12 +62,11 @@ check_not_of_agent <- function(names, of_agent, place, call) {
 check_spelling <- function(names, choices, can_begin, call) {
   for (name in names) {
     near <- nearest_name(name, choices)
-    if (length(near) && (plain_name(near) == plain_name(name) || !can_begin)) {
-      abort_wrong(
-        name, NULL, call, "There is no argument `{name}`.",
-        i = "Did you mean `{near}`?"
-      )
-    }
+    abort_if(
+      length(near) && (plain_name(near) == plain_name(name) || !can_begin),
+      name, NULL, call, "There is no argument `{name}`.",
+      i = "Did you mean `{near}`?"
+    )
   }
 }
 
@@ -103,33 +96,27 @@ check_training_ends <- function(vector_env, settings, online, call) {
     return()
   }
   state <- state_without_end(model)
-  if (!is.null(state)) {
-    abort_wrong(
-      "max_steps", NULL, call,
-      "An episode of {environment_label(vector_env)} that reaches state {state} never ends.",
-      i = "Give `max_steps`, after which an episode is cut off, or let the model end there."
-    )
-  }
+  abort_if(
+    !is.null(state), "max_steps", NULL, call,
+    "An episode of {environment_label(vector_env)} that reaches state {state} never ends.",
+    i = "Give `max_steps`, after which an episode is cut off, or let the model end there."
+  )
 }
 
 check_agent <- function(agent, call) {
-  if (is.function(agent)) {
-    abort_wrong(
-      "agent", agent, call, "`agent` must be an agent, not a function.",
-      i = "Did you forget the parentheses, as in `agent_ars()`?"
-    )
-  }
-  if (!inherits(agent, "gym_agent")) {
-    abort_wrong(
-      "agent", agent, call,
-      "`agent` must be an agent made by a function such as `agent_ars()`, not
-       {describe_argument(agent)}.",
-      i = if (is.character(agent)) {
-        "There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`,
-         `agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables `agent_monte_carlo()`,
-         `agent_td()`, `agent_q()`, `agent_sarsa()`, `agent_actor_critic()`. `learn_sb3()` trains
-         by others, such as SAC."
-      }
-    )
-  }
+  abort_if(
+    is.function(agent), "agent", agent, call, "`agent` must be an agent, not a function.",
+    i = "Did you forget the parentheses, as in `agent_ars()`?"
+  )
+  abort_if(
+    !inherits(agent, "gym_agent"), "agent", agent, call,
+    "`agent` must be an agent made by a function such as `agent_ars()`, not
+     {describe_argument(agent)}.",
+    i = if (is.character(agent)) {
+      "There are `agent_random()`, `agent_hill_climb()`, `agent_cem()`, `agent_ars()`,
+       `agent_reinforce()`, `agent_ppo()`, `agent_dqn()`, and for tables `agent_monte_carlo()`,
+       `agent_td()`, `agent_q()`, `agent_sarsa()`, `agent_actor_critic()`. `learn_sb3()` trains
+       by others, such as SAC."
+    }
+  )
 }

@@ -136,10 +136,7 @@ default_policy <- function(agent) UseMethod("default_policy")
 default_policy.gym_agent <- function(agent) policy_linear()
 
 #' @export
-print.gym_agent <- function(x, ...) {
-  cat("<agent: ", format(x), ">\n", sep = "")
-  invisible(x)
-}
+print.gym_agent <- function(x, ...) print_lines(x, paste0("<agent: ", format(x), ">"))
 
 #' @export
 format.gym_agent <- function(x, ...) class(x)[[1L]]

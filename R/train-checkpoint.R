@@ -153,17 +153,15 @@ print.gym_checkpoint <- function(x, ...) {
   }
   saved <- unserialize(x$state)
   training <- saved$training
-  cat(
+  print_lines(x, c(
     paste0("<checkpoint of a ", saved$what, " in ", saved$server$env_id, " by ",
            format(training$agent), ">"),
     paste0("Seed ", whole_number_text(saved$seed), ", ",
            count_of(training$iteration, if (saved$what == "search") "round" else "iteration"), ", ",
            count_of(training$steps, "step"), if (training$ended) ", ended"),
     "The call that wrote the file resumes from it: give the file as `checkpoint`.",
-    "Its result is a training; this object has none of its elements.",
-    sep = "\n"
-  )
-  invisible(x)
+    "Its result is a training; this object has none of its elements."
+  ))
 }
 
 # The same training --------------------------------------------------------------------

@@ -8,14 +8,22 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
   of_each <- lapply(split(runs$env_id, runs$training), function(ids) {
     sort(unique(ids), na.last = TRUE)
   })
-  if (length(unique(of_each)) > 1L) {
-    abort_wrong(
-      "...", NULL, call, "All agents must have been trained in the same environments.",
-      x = '{paste0(names(of_each), ": ", vapply(of_each, toString, ""), collapse = "; ")}'
-    )
-  }
+  abort_if(
+    length(unique(of_each)) > 1L,
+    "...", NULL, call, "All agents must have been trained in the same environments.",
+    x = '{paste0(names(of_each), ": ", vapply(of_each, toString, ""), collapse = "; ")}'
+  )
   if (is.null(reference) && length(ids) > 1L) reference <- default_reference(trainings, call)
-  if (!is.null(reference)) runs$score <- normalised_scores(runs, reference, call)
+  if (!is.null(reference)) {
+    at <- match(runs$env_id, reference$env_id)
+    span <- reference$high[at] - reference$low[at]
+    wrong <- runs$env_id[is.na(at) | !is.finite(span) | span == 0]
+    abort_if(
+      length(wrong), "reference", reference, call,
+      "`reference` must have a row for {wrong[[1L]]} with two different numbers."
+    )
+    runs$score <- (runs$score - reference$low[at]) / span
+  }
   scores <- lapply(split(runs, factor(runs$training, unique(runs$training))), function(own) {
     split(own$score, factor(own$env_id, ids, exclude = NULL))
   })
@@ -57,12 +65,11 @@ run_scores <- function(trainings, curves, steps, call) {
   }
   by_end <- is.null(steps) && same
   at <- steps %||% if (same && length(trainings)) budgets else min(ends)
-  if (at > min(ends)) {
-    abort_wrong(
-      "total_steps", at, call, "Not all runs have taken {whole_number_text(at)} steps.",
-      i = "The shortest ended after {whole_number_text(min(ends))}."
-    )
-  }
+  abort_if(
+    at > min(ends),
+    "total_steps", at, call, "Not all runs have taken {whole_number_text(at)} steps.",
+    i = "The shortest ended after {whole_number_text(min(ends))}."
+  )
   score <- vapply(of_run, function(run) {
     returns_at(run, if (by_end) max(run$steps) else at)
   }, 0)
@@ -81,13 +88,11 @@ run_scores <- function(trainings, curves, steps, call) {
 
 # The return of a random policy, and the environment's threshold.
 default_reference <- function(trainings, call) {
-  if (!length(trainings)) {
-    abort_wrong(
-      "reference", NULL, call,
-      "Scores of several environments are compared when they are normalised.",
-      i = "Give `reference`, a data frame with the columns env_id, low and high."
-    )
-  }
+  abort_if(
+    !length(trainings), "reference", NULL, call,
+    "Scores of several environments are compared when they are normalised.",
+    i = "Give `reference`, a data frame with the columns env_id, low and high."
+  )
   ones <- lapply(trainings, function(x) each_training(x)[[1L]])
   ones <- ones[!duplicated(vapply(ones, function(one) one$env_id, ""))]
   do.call(rbind, unname(lapply(ones, function(one) {
@@ -98,32 +103,17 @@ default_reference <- function(trainings, call) {
       one$env$spec$reward_threshold
     }
     high <- training_target(NULL, list(id = one$env_id, reward_threshold = registered))
-    if (!length(high) || is.na(high)) {
-      abort_wrong(
-        "reference", NULL, call,
-        "{one$env_id} has no threshold, by which scores could be normalised.",
-        i = "Give `reference`, a data frame with the columns env_id, low and high."
-      )
-    }
+    abort_if(
+      !length(high) || is.na(high), "reference", NULL, call,
+      "{one$env_id} has no threshold, by which scores could be normalised.",
+      i = "Give `reference`, a data frame with the columns env_id, low and high."
+    )
     random <- rlang::exec(
       evaluate_policy, one$env, policy_random(), !!!one$kwargs, max_steps = one$max_steps, seed = 1,
       progress = FALSE
     )
     data.frame(env_id = one$env_id, low = random$mean_return, high = as.numeric(high))
   })))
-}
-
-normalised_scores <- function(runs, reference, call) {
-  at <- match(runs$env_id, reference$env_id)
-  span <- reference$high[at] - reference$low[at]
-  if (anyNA(at) || !all(is.finite(span) & span != 0)) {
-    wrong <- runs$env_id[is.na(at) | !is.finite(span) | span == 0][[1L]]
-    abort_wrong(
-      "reference", reference, call,
-      "`reference` must have a row for {wrong} with two different numbers."
-    )
-  }
-  (runs$score - reference$low[at]) / span
 }
 
 # Statistics ----------------------------------------------------------------------------
@@ -153,20 +143,17 @@ interval_of <- function(values, level) {
 }
 
 score_table <- function(scores, drawn, level) {
-  rows <- lapply(names(scores), function(label) {
+  do.call(rbind, lapply(names(scores), function(label) {
     # In one environment the median of the environments' means is the mean.
     shown <- setdiff(names(score_statistics), if (length(scores[[label]]) == 1L) "median")
-    do.call(rbind, lapply(shown, function(name) {
-      statistic <- score_statistics[[name]]
-      interval <- interval_of(statistic(drawn[[label]]), level)
-      data.frame(
-        training = label, runs = sum(lengths(scores[[label]])), statistic = name,
-        value = statistic(as_columns(scores[[label]])), lower = interval[[1L]],
-        upper = interval[[2L]]
-      )
-    }))
-  })
-  do.call(rbind, rows)
+    statistics <- score_statistics[shown]
+    interval <- vapply(statistics, function(of) interval_of(of(drawn[[label]]), level), numeric(2))
+    data.frame(
+      training = label, runs = sum(lengths(scores[[label]])), statistic = shown,
+      value = vapply(statistics, function(of) of(as_columns(scores[[label]])), 0),
+      lower = interval[1L, ], upper = interval[2L, ], row.names = NULL
+    )
+  }))
 }
 
 # The probability that a run of one training scores higher than one of the other: ties count half.

@@ -90,7 +90,11 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
   call <- rlang::current_env()
   check_no_steps(...names(), call)
   check_number(total_steps, min = 0, allow_null = TRUE)
-  check_reference(reference, call)
+  columns <- c("env_id", "low", "high")
+  check_that(
+    is.null(reference) || is.data.frame(reference) && all(columns %in% names(reference)), reference,
+    "NULL, or a data frame with the columns env_id, low and high", "reference", call
+  )
   check_count(reps)
   check_seed(seed)
   check_level(level)
@@ -132,9 +136,8 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
   compared$total_steps <- NULL
   few <- min(runs_each(compared$runs))
   if (few < 5L) {
-    rlang::warn(
-      c(paste0("There ", if (few == 1L) "is " else "are ", count_of(few, "seed"),
-               " of a training: intervals of so few mean little."),
+    cli::cli_warn(
+      c("There {?is/are} {few} seed{?s} of a training: intervals of so few mean little.",
         i = "Train with at least five, better ten or more."),
       class = "gym_warning_seeds"
     )
@@ -164,14 +167,12 @@ check_are_trainings <- function(given, call) {
 # All have a target or none has: otherwise there is nothing to compare them by.
 stop_at_target <- function(trainings, call) {
   stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)
-  if (any(stops) && !all(stops)) {
-    abort_wrong(
-      "...", NULL, call,
-      "Some trainings stop at a target ({toString(names(trainings)[stops])}), and others do not
-       ({toString(names(trainings)[!stops])}).",
-      i = "Train all with `target = Inf` to compare scores, or all with the same target."
-    )
-  }
+  abort_if(
+    any(stops) && !all(stops), "...", NULL, call,
+    "Some trainings stop at a target ({toString(names(trainings)[stops])}), and others do not
+     ({toString(names(trainings)[!stops])}).",
+    i = "Train all with `target = Inf` to compare scores, or all with the same target."
+  )
   any(stops)
 }
 
@@ -193,23 +194,12 @@ check_different_runs <- function(trainings, call) {
 # The number of runs of each training in each environment.
 runs_each <- function(runs) table(paste(runs$training, runs$env_id, sep = "\r"))
 
-check_reference <- function(reference, call) {
-  columns <- c("env_id", "low", "high")
-  if (!is.null(reference) && !(is.data.frame(reference) && all(columns %in% names(reference)))) {
-    abort_argument(reference, "NULL, or a data frame with the columns env_id, low and high",
-                   "reference", call)
-  }
-}
-
 #' @rdname compare_trainings
 #' @export
 as.data.frame.gym_comparison <- function(x, row.names = NULL, optional = FALSE, ...) x$table
 
 #' @export
-print.gym_comparison <- function(x, ...) {
-  cat(comparison_lines(x), sep = "\n")
-  invisible(x)
-}
+print.gym_comparison <- function(x, ...) print_lines(x, comparison_lines(x))
 
 # A training ends with the iteration that reaches its budget. With many trainings, those of all.
 steps_taken_line <- function(runs) {

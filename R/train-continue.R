@@ -21,15 +21,14 @@ agent_to_train <- function(agent, policy, search, call) {
     rate <- agent$learning_rate
     taken <- agent$steps %||% agent$taken
     # A schedule that has come to its end at 0 would let the training go on in vain.
-    if (is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0)) {
-      abort_wrong(
-        "learning_rate", rate, call,
-        'The schedule of `learning_rate` is 0 after the agent\'s {count_of(taken, "step")}, so it
-         would learn nothing more.',
-        i = "Give a new `learning_rate` along with `policy = training`, or set it:
-             `agent$learning_rate <- 1e-4`."
-      )
-    }
+    abort_if(
+      is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0),
+      "learning_rate", rate, call,
+      'The schedule of `learning_rate` is 0 after the agent\'s {count_of(taken, "step")}, so it
+       would learn nothing more.',
+      i = "Give a new `learning_rate` along with `policy = training`, or set it:
+           `agent$learning_rate <- 1e-4`."
+    )
     cli::cli_inform(
       c(i = paste("Going on with a trained agent, with all that it has learned. A new one, made by",
                   "a function such as {.code agent_ppo()}, starts again.")),
@@ -85,13 +84,11 @@ take_over <- function(earlier, agent, call) {
 continued_agent <- function(agent, bound, call) {
   if (learns_online(agent)) {
     for (space in names(agent$spaces)) {
-      if (!identical(format(agent$spaces[[space]]), format(bound[[space]]))) {
-        abort_wrong(
-          "env", NULL, call,
-          'The agent has learned with the {sub("_", " ", space)} {format(agent$spaces[[space]])},
-           and this environment has {format(bound[[space]])}.'
-        )
-      }
+      abort_if(
+        !identical(format(agent$spaces[[space]]), format(bound[[space]])), "env", NULL, call,
+        'The agent has learned with the {sub("_", " ", space)} {format(agent$spaces[[space]])},
+         and this environment has {format(bound[[space]])}.'
+      )
     }
   } else if (!is.null(agent$policy)) {
     agent$policy <- bound

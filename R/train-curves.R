@@ -110,14 +110,12 @@ curve_rows <- function(x, label, call) {
       abort_wrong("...", x, call, 'There is no file or folder "{x}".')
     }
     rows <- read_logs(x, call)[[1L]]
-    if (is.null(rows)) {
-      abort_wrong(
-        "...", x, call, '"{x}" has no log of a training.',
-        i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
-             Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
-        i = if (endsWith(x, ".rds")) "A result that `readRDS()` returns is an argument, too."
-      )
-    }
+    abort_if(
+      is.null(rows), "...", x, call, '"{x}" has no log of a training.',
+      i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
+           Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
+      i = if (endsWith(x, ".rds")) "A result that `readRDS()` returns is an argument, too."
+    )
     # Runs with unknown seeds are numbered.
     unknown <- is.na(rows$seed)
     rows$seed[unknown] <- match(rows$run[unknown], unique(rows$run))

@@ -128,9 +128,9 @@ play_evaluation <- function(state, vector_env, settings, policy, episodes, final
   cut_off <- sum(episodes$length >= limit)
   if (is.null(settings$max_steps) && cut_off && !isTRUE(state$told_limit)) {
     state$told_limit <- TRUE
-    rlang::inform(
-      c(i = paste0("An evaluation cut off ", cut_off, " of ", count_of(nrow(episodes), "episode"),
-                   " after ", count_of(limit, "step"), "; `max_steps` sets another limit.")),
+    cli::cli_inform(
+      c(i = 'An evaluation cut off {cut_off} of {count_of(nrow(episodes), "episode")} after
+             {count_of(limit, "step")}; `max_steps` sets another limit.'),
       class = "gym_message_cut_off"
     )
   }

@@ -67,14 +67,12 @@ only_results <- function(values, class, call = rlang::caller_env(), unique = TRU
 }
 
 given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {
-  if (any(vapply(values, inherits, NA, "gym_search"))) {
-    abort_wrong(
-      "...", NULL, call,
-      "A search by `search_random()` has no evaluations that could be compared with those of a
-       training.",
-      i = "`train_agent(agent_random(), ...)` has."
-    )
-  }
+  abort_if(
+    any(vapply(values, inherits, NA, "gym_search")), "...", NULL, call,
+    "A search by `search_random()` has no evaluations that could be compared with those of a
+     training.",
+    i = "`train_agent(agent_random(), ...)` has."
+  )
   only_results(values, c("gym_training", "gym_trainings"), call, unique)
 }
 

@@ -248,12 +248,11 @@ samples_model <- function(settings, draws_map) {
 model_to_sample <- function(settings, call) {
   model <- settings$model
   id <- model$spec$id
-  if (is.null(settings$max_steps) && is.null(model$spec$max_episode_steps)) {
-    abort_wrong(
-      "max_steps", NULL, call, "{id} has no step limit, so an episode may never end.",
-      i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."
-    )
-  }
+  abort_if(
+    is.null(settings$max_steps) && is.null(model$spec$max_episode_steps),
+    "max_steps", NULL, call, "{id} has no step limit, so an episode may never end.",
+    i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."
+  )
   cli::cli_inform(
     c(i = "Learning from the model of {id} in R; {.code model = FALSE} plays on the server."),
     class = "gym_message_model"

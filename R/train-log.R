@@ -73,7 +73,7 @@ training_log <- function(folder, settings, state, call) {
     {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
       write_config(file.path(folder, "config.json"), settings)
-      # Tables that exist when a training begins belong to another training.
+      # Tables that exist when a training begins belong to another one.
       if (state$iteration == 0L) for (file in c(table, evaluations)) keep_as_earlier(file)
       write_all()
     },

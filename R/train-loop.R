@@ -262,9 +262,9 @@ pace_left <- 60
 inform_of_start <- function(episodes, elapsed) {
   tells <- elapsed >= pace_after && prints_times()
   if (tells) {
-    rlang::inform(
-      c(i = paste0("Training has begun: ", count_of(episodes, "episode"),
-                   " of the first iteration in ", seconds_text(elapsed), ".")),
+    cli::cli_inform(
+      c(i = 'Training has begun: {count_of(episodes, "episode")} of the first iteration in
+             {seconds_text(elapsed)}.'),
       class = "gym_message_pace"
     )
   }
@@ -275,10 +275,9 @@ inform_of_pace <- function(finished, total, unit, elapsed) {
   left <- elapsed * (total / finished - 1)
   tells <- finished > 0 && elapsed >= pace_after && left >= pace_left && prints_times()
   if (tells) {
-    rlang::inform(
-      c(i = paste0("Trained for ", whole_number_text(finished), " of ",
-                   count_of(total, tolower(unit)), " in ", seconds_text(elapsed),
-                   "; at this rate the rest takes ", seconds_text(left), "."),
+    cli::cli_inform(
+      c(i = "Trained for {whole_number_text(finished)} of {count_of(total, tolower(unit))} in
+             {seconds_text(elapsed)}; at this rate the rest takes {seconds_text(left)}.",
         i = "`progress = TRUE` shows a bar."),
       class = "gym_message_pace"
     )

@@ -24,9 +24,11 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
 #'   A string written in the call, also as a branch of `if`, is a template, in which `{x}` is the
 #'   value of R code, as in [cli::pluralize()], and a line break is a space. Any other code gives a
 #'   text that is shown as it is: it may have braces that a user or a server wrote.
+#' @param frame Where this code is evaluated.
 #' @noRd
-abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument") {
-  frame <- parent.frame()
+abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument",
+                        frame = rlang::caller_env()) {
+  force(frame)
   fill <- function(part) {
     if (is.call(part) && identical(part[[1L]], quote(`if`))) {
       chosen <- if (eval(part[[2L]], frame)) 3L else 4L
@@ -41,6 +43,11 @@ abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument"
   }
   lines <- unlist(lapply(as.list(substitute(list(...)))[-1L], fill))
   gym_abort(lines[nzchar(lines)], class = class, argument = argument, value = value, call = call)
+}
+
+# The other arguments are evaluated only if there is a problem.
+abort_if <- function(problem, argument, value, call, ..., frame = rlang::caller_env()) {
+  if (problem) abort_wrong(argument, value, call, ..., frame = frame)
 }
 
 #' Let errors name the call of the function that the user called

@@ -97,8 +97,10 @@ few_names <- function(names) {
 }
 
 # Prints an object that format() describes in one line.
-print_line <- function(x) {
-  cat(format(x), "\n", sep = "")
+print_line <- function(x) print_lines(x, format(x))
+
+print_lines <- function(x, lines) {
+  writeLines(lines)
   invisible(x)
 }
 

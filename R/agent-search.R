@@ -162,7 +162,7 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
   unchosen <- if (missing(env)) "gym_warning_gymnasium" else character()
   # A new network draws weights; that must not change the search.
   keep_random_state(force(policy))
-  # Who takes the tutorial's environment by default is not told that its version is out of date.
+  # The default environment is the tutorial's, so nobody is warned that its version is out of date.
   suppressWarnings(classes = unchosen, naming_own_call(
     train_agent(
       agent_random(), env, policy, iterations = as.integer(rounds), episodes = episodes,
@@ -171,4 +171,172 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
     ),
     "train_agent"
   ))
+}
+
+# Hill climbing --------------------------------------------------------------------------
+
+#' Hill climbing
+#'
+#' Add uniform noise from `-noise` to `noise` to the best weights so far, and keep the result if it
+#' does better. The search gets stuck if the best weights were lucky, or if all weights nearby do
+#' equally badly.
+#'
+#' @param noise The largest distance of a candidate from the best weights, in each weight, a number
+#'   above 0.
+#' @param candidates The number of candidates per iteration, a whole number of at least 1. The
+#'   default is 1.
+#' @inheritParams agent_ars
+#' @return `agent_hill_climb()` returns an agent of class `gym_agent_hill_climb`, whose policy has
+#'   the best weights so far. `search_hill_climb()` makes this agent, trains it and returns the
+#'   result of [train_agent()].
+#' @section Errors: `gym_error_argument` for an invalid argument.
+#' @references K. Frans (2016), Simple reinforcement learning methods to learn CartPole,
+#'   <https://kvfrans.com/simple-algoritms-for-solving-cartpole/>.
+#' @seealso [agent_ars()], [agent_cem()]; [agent_ask()] explains what an agent is.
+#' @export
+#' @examples
+#' agent_hill_climb()
+#' agent_hill_climb(noise = 0.5, candidates = 8)
+#' @examplesIf gym:::can_start_server()
+#' search_hill_climb("CartPole-v1", candidates = 8, iterations = 20, seed = 1)
+agent_hill_climb <- function(noise = 0.1, candidates = 1) {
+  check_above_zero(noise)
+  check_count(candidates)
+  structure(
+    list(
+      noise = noise, candidates = as.integer(candidates), best_return = -Inf, policy = NULL
+    ),
+    class = c("gym_agent_hill_climb", "gym_agent")
+  )
+}
+
+#' @export
+agent_start.gym_agent_hill_climb <- function(agent, policy) {
+  agent <- NextMethod()
+  agent$best_return <- -Inf
+  agent
+}
+
+#' @export
+agent_ask.gym_agent_hill_climb <- function(agent) {
+  weights <- stats::coef(agent$policy)
+  n <- agent$candidates
+  away <- matrix(stats::runif(n * length(weights), -agent$noise, agent$noise), n)
+  rep(weights, each = n) + away
+}
+
+#' @export
+agent_tell.gym_agent_hill_climb <- function(agent, results) {
+  agent <- NextMethod()
+  best <- which.max(results$returns)
+  if (results$returns[[best]] > agent$best_return) {
+    agent$best_return <- results$returns[[best]]
+    coef(agent$policy) <- results$weights[best, ]
+  }
+  agent
+}
+
+#' @export
+format.gym_agent_hill_climb <- function(x, ...) {
+  agent_text("hill climbing", c(x["noise"], if (x$candidates > 1L) x["candidates"]))
+}
+
+#' @rdname agent_hill_climb
+#' @export
+search_hill_climb <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_hill_climb", env, policy = policy, ...)
+}
+
+# The cross-entropy method ---------------------------------------------------------------
+
+#' The cross-entropy method
+#'
+#' Draw the candidates of an iteration from a normal distribution of the weights, in which weights
+#' are independent. The mean and standard deviation of the best candidates, the elite, become those
+#' of the next iteration (Szita and Lorincz 2006). An extra noise, which decreases to 0, is added to
+#' the variance. Without it the distribution soon becomes so narrow that the search gets stuck.
+#'
+#' The weights of the agent's policy are the mean of the distribution. The first mean is the weights
+#' that the policy has when training begins.
+#'
+#' @param population The number of candidates per iteration, a whole number of at least 2.
+#' @param elite How many of them are the elite, a whole number from 1 to `population`. The default
+#'   is a fifth of them.
+#' @param noise The standard deviation of the first distribution, a number above 0.
+#' @param extra_noise The standard deviation of the extra noise in the first iteration, a number of
+#'   at least 0.
+#' @param extra_iterations The number of iterations after which the extra noise is 0, a whole number
+#'   of at least 1. Its variance decreases by the same amount in each.
+#' @inheritParams agent_ars
+#' @return `agent_cem()` returns an agent of class `gym_agent_cem`. `search_cem()` makes this agent,
+#'   trains it and returns the result of [train_agent()].
+#' @section Errors: `gym_error_argument` for an invalid argument.
+#' @references I. Szita and A. Lorincz (2006), Learning Tetris using the noisy cross-entropy method,
+#'   Neural Computation 18(12), 2936-2941.
+#' @seealso [agent_ars()], [agent_hill_climb()]; [agent_ask()] explains what an agent is.
+#' @export
+#' @examples
+#' agent_cem()
+#' agent_cem(population = 100, elite = 10)
+#' @examplesIf gym:::can_start_server()
+#' search_cem("CartPole-v1", policy_network(), iterations = 20, seed = 1)
+agent_cem <- function(population = 40, elite = max(1, population %/% 5), noise = 1,
+                      extra_noise = 1, extra_iterations = 20) {
+  check_count(population, min = 2)
+  check_count(elite, max = population)
+  check_above_zero(noise)
+  check_number(extra_noise, min = 0)
+  check_count(extra_iterations)
+  structure(
+    list(
+      population = as.integer(population), elite = as.integer(elite), noise = noise,
+      extra_noise = extra_noise, extra_iterations = as.integer(extra_iterations), iteration = 0L,
+      deviation = NULL, policy = NULL
+    ),
+    class = c("gym_agent_cem", "gym_agent")
+  )
+}
+
+#' @export
+agent_start.gym_agent_cem <- function(agent, policy) {
+  agent <- NextMethod()
+  agent$deviation <- rep(agent$noise, length(stats::coef(policy)))
+  agent$iteration <- 0L
+  agent
+}
+
+#' @export
+agent_ask.gym_agent_cem <- function(agent) {
+  mean <- stats::coef(agent$policy)
+  left <- max(0, 1 - agent$iteration / agent$extra_iterations)
+  deviation <- sqrt(agent$deviation^2 + agent$extra_noise^2 * left)
+  n <- agent$population
+  drawn <- matrix(stats::rnorm(n * length(mean)), n, length(mean))
+  rep(mean, each = n) + drawn * rep(deviation, each = n)
+}
+
+#' @export
+agent_tell.gym_agent_cem <- function(agent, results) {
+  agent <- NextMethod()
+  best <- order(-results$returns)[seq_len(agent$elite)]
+  elite <- results$weights[best, , drop = FALSE]
+  mean <- colMeans(elite)
+  coef(agent$policy) <- mean
+  # A single candidate has no standard deviation, and with 0 all candidates would be the same.
+  if (agent$elite > 1L) {
+    agent$deviation <- sqrt(colMeans((elite - rep(mean, each = agent$elite))^2))
+  }
+  agent$iteration <- agent$iteration + 1L
+  agent
+}
+
+#' @export
+format.gym_agent_cem <- function(x, ...) {
+  agent_text("CEM", x[c("population", "elite", "noise", "extra_noise", "extra_iterations")])
+}
+
+#' @rdname agent_cem
+#' @export
+search_cem <- function(env = "CartPole-v1", policy = NULL, ...) {
+  make_and_train("agent_cem", env, policy = policy, ...)
 }
