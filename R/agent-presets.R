@@ -195,7 +195,7 @@ with_preset <- function(agent, preset, given) {
   agent
 }
 
-# Those of the environment, if the user's arguments fit none of them.
+# Name the presets of the environment if the user's arguments fit none of them.
 other_presets_text <- function(env) {
   presets <- if (is.character(env)) own_presets(env)
   if (NROW(presets)) {

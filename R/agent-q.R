@@ -238,7 +238,7 @@ learn_q <- function(env, ...) {
   }
   call <- rlang::current_env()
   given <- list(...)
-  # Nobody acts while a table is learned from data, so most arguments have no meaning.
+  # Learning from data plays nothing, so most arguments do not apply.
   unfit <- setdiff(rlang::names2(given), c("discount", "double", "iterations"))
   abort_if(
     length(unfit),

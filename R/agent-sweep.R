@@ -109,7 +109,7 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   done <- Filter(Negate(is.null), tuned$trainings)
   comparison <- if (length(done)) rlang::exec(compare_trainings, !!!done, seed = 1)
   best <- if (!is.null(comparison)) best_settings(comparison)
-  # Of settings that are equally good none is the best.
+  # If settings tie, report no best one.
   if (length(best) != 1L) best <- NULL
   reported <- if (!is.null(report_seeds) && !is.null(best) && !tuned$interrupted) {
     train(agents[best], report_seeds)

@@ -1,4 +1,4 @@
-#' Evaluate a policy by data of another one
+#' Evaluate a policy with data from another policy
 #'
 #' Estimate the value of a policy from steps that somebody else took: the mean, over the starts of
 #' the data, of the discounted sum of rewards that the policy would get.
@@ -184,7 +184,7 @@ check_interval <- function(interval, method, chosen, call) {
   }
 }
 
-# The steps of the policy in pairs of a state and an action that a table has no step of.
+# Warn if the policy takes actions in states for which the table has no data.
 check_pairs <- function(design) {
   regression <- design$regression
   if (is.null(regression$states)) {

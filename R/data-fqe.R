@@ -19,8 +19,8 @@ policy_fits <- function(design, prepared, next_at, start = NULL) {
       prepared$weight * usable, design$call
     )))
   }
-  # Steps are the last one, the one before, and so on. No policy here counts them unless `stages`
-  # or the policy does.
+  # Go backwards from the last step. The number of the step matters only with `stages` or a policy
+  # that counts steps.
   ahead_of <- function(fit, step) {
     if (!is.null(fit)) {
       policy_mean(regression$values(fit, prepared$after), next_at(step + 1))
@@ -99,7 +99,7 @@ fitted_value <- function(design, fitting, count) {
     fits <- if (all(count == 1)) {
       own$fit
     } else {
-      # What only episodes know that were not drawn keeps its place, with almost no weight.
+      # Keep the rows of episodes that were not drawn with almost no weight: they have levels, too.
       prepared <- weigh_steps(own$prepared, pmax(count, tiny_weight)[own$prepared$episode])
       policy_fits(design, prepared, own$next_at, own$fit[[1L]])
     }

@@ -43,7 +43,7 @@ rules_of_folds <- function(policy, steps, fold, folds) {
 #' @noRd
 action_probabilities <- function(rules, steps, fold, call) {
   many <- length(rules)
-  # Only a rule with a horizon depends on the step, and counts no further than it.
+  # Only a rule with a horizon depends on the step; it stops counting at the horizon.
   horizon <- if (inherits(rules[[1L]], "gym_policy_fitted")) length(rules[[1L]]$fits) else 0L
   counts <- horizon > 1L
   ask <- function(own, states, step) {

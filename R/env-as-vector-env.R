@@ -1,7 +1,7 @@
 #' Convert an environment to a vector environment to play in
 #'
-#' All functions that play use this interface: [rollout()] and every search call it, and use nothing
-#' else of an environment. Write a method for your own class to let all of them play another kind of
+#' All functions that play step by step use this interface: [rollout()] and every search call it, and
+#' use nothing else of an environment. Write a method for your own class to let all of them play another kind of
 #' environment.
 #'
 #' An environment given by its id is made, and closed by `$close()`. It gets 256 sub-environments.

@@ -231,8 +231,8 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
 
 # FrozenLake's random maps -----------------------------------------------------------------
 
-# Gymnasium draws one in the constructor, from a generator that cannot be
-# seeded. Here it is drawn from the seed of the run and sent.
+# Gymnasium draws a random map in the constructor, from a generator that cannot be seeded. Here it
+# is drawn from the seed of the run and sent.
 
 lake_size <- 8L
 chance_of_ice <- 0.8

@@ -70,7 +70,7 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
     )
     instance$steps[[slot]] <- request
   }
-  # It may come from another step. Take that one first.
+  # The action may itself take a step: evaluate it first.
   force(action)
   stream <- stream_of(instance)
   message <- if (!is.null(stream$con) && !stream$busy) {

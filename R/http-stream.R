@@ -2,7 +2,7 @@
 # curl and HTTP do for a request takes several times as long as a step. inst/server/PROTOCOL.md
 # describes the messages.
 
-# R has some 128 connections for everybody.
+# R allows about 128 open connections in a session.
 most_streams <- 32L
 
 # A stream that was used within so many messages of the session is not closed to open another one.

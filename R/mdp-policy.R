@@ -196,7 +196,7 @@ expected_return <- function(model, backup, probabilities, limit, discount, call)
   start_mean(model, limited_values(backup, probabilities, limit, discount, call))
 }
 
-# One sweep costs as much as the policy has moves: each row of the matrices has those of a state.
+# The cost of a sweep grows with the number of moves: a row of the matrices has a state's moves.
 limited_values <- function(backup, probabilities, limit, discount, call) {
   if (limit == Inf) {
     return(policy_values(backup, probabilities, discount, call)$values)

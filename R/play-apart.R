@@ -23,7 +23,7 @@ plays_apart <- function(policy) {
   }
 }
 
-# The environment with the observations that the policy gets, which may be other ones.
+# The environment with the observation space of the policy, which wrappers may have changed.
 seen_by <- function(policy, vector_env) {
   first <- policy_subset(policy, 1L)
   if (!is.null(first$observation_space)) vector_env$observation_space <- first$observation_space

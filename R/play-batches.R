@@ -1,4 +1,4 @@
-# Episodes of many candidates. Those that the server plays itself are all requested together
+# Episodes of many candidates. Those that the server plays itself are requested in large pieces
 # (play-beside.R); others are divided into batches and played from R, batch after batch.
 #
 # The rule: episodes are taken candidate by candidate. A batch has as many whole candidates as fit,

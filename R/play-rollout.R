@@ -9,7 +9,7 @@
 #' random policy. Without it, one seed is drawn from R's generator, so [set.seed()] fixes
 #' everything, too. (The weights of a policy made in the call are drawn separately.)
 #'
-#' # Two ways to play
+#' # Ways to play
 #'
 #' **Beside the environment**: the policy is sent to the server, whose processes play whole episodes
 #' with it. This applies if the environment is given by its id (with arguments, and wrappers of
@@ -25,6 +25,9 @@
 #' * episodes without a step limit, by the environment or `max_steps`,
 #' * a vector implementation such as CartPole's with a `num_envs` other than 256,
 #' * a server that is older than this package.
+#'
+#' **By Stable-Baselines3**: a policy of [learn_sb3()] that is no network of R plays whole episodes in
+#' a process of its own.
 #'
 #' Many episodes are played together in sub-environments, except with frames. The policy gets only
 #' the episodes that are still running, so a function gets fewer rows at the end.

@@ -104,7 +104,7 @@ steps_by_episode <- function(x, arg, call) {
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
-  # NumPy calculates what policies do that play on the server.
+  # NumPy computes the actions of policies that play on the server.
   # The versions of the server and of what simulates the environment, such as MuJoCo: episodes may
   # differ from one version to another.
   versions <- c(server_versions(vector_env$client), vector_env$spec$engine) %||%

@@ -123,7 +123,7 @@ place_states <- function(cells, env_id, spaces, columns, directions, own_columns
   check_count(columns, allow_null = TRUE, call = call)
   known <- known_grid(env_id)
   numbers <- state_numbers(spaces$action_space)
-  # What actions are called: as it was said, as in the known grid, or by their names or numbers.
+  # Label actions by `directions`, else as in the known grid, else by their names or numbers.
   directions <- directions %||% known_directions[[known]] %||% value_labels(spaces$action_space)
   if (!is.character(directions) || length(directions) != length(numbers)) {
     must <- paste("a string for each of", count_of(length(numbers), "action"))

@@ -28,10 +28,10 @@ action_colours <- function(n) {
   light[seq_len(n)]
 }
 
-# Of more actions than there are colours, or symbols, the numbers are a scale.
+# With more actions than colours or symbols, use a continuous scale.
 most_named_actions <- 6L
 
-# What the fill of a region or cell is: the name of its action, or of many actions the number.
+# The fill of a region or cell: the name of its action, or its number if there are many actions.
 shown_actions <- function(actions, numbers, labels) {
   named <- length(numbers) <= most_named_actions
   if (named) factor(labels[match(actions, numbers)], labels) else actions

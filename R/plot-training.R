@@ -49,7 +49,7 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
   }
   evaluations <- x$evaluations
   evaluations$steps <- evaluation_steps(x)
-  # Of several final ones the last counts.
+  # If there are several final evaluations, use the last.
   earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
   evaluations <- evaluations[!earlier, ]
   final <- evaluations[evaluations$kind == "final", ]

@@ -101,9 +101,7 @@ abort_prediction <- function(policy, problem, hints, call, parent = NULL) {
   )
 }
 
-# What a model was fitted to ------------------------------------------------------------
-
-# What a model was fitted to, which must be the actions of the environment.
+# Check what a model was fitted to: it must be the actions of the environment -------------
 
 check_response <- function(policy, space, env_id, call) {
   check_labels(policy, space, env_id, call)

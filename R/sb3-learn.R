@@ -295,7 +295,7 @@ sb3_job <- function(settings, keeps) {
   )
 }
 
-# What makes a training another one. The budget and the evaluations may differ.
+# Settings that must be the same to resume a training. The budget and the evaluations may differ.
 of_sb3_training <- c("algorithm", "policy", "num_envs", "env_kwargs", "arguments", "env_id",
                      "normalize")
 

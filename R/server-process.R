@@ -149,7 +149,7 @@ end_reason <- function(process, log) {
   } else if (length(python) && startsWith(python[[1L]], "Timeout")) {
     "C code held Python's lock for longer than the server's `max_call_seconds`."
   } else if (any(grepl("^[^ ]* ?terminat.*bad_alloc", lines))) {
-    # C++ says so, and ends the process.
+    # C++ prints this and aborts.
     paste("The system gave it no more memory: make fewer or smaller environments, or raise",
           "`gym_server_start(max_memory_mb = )`.")
   } else if (length(python)) {

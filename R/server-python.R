@@ -53,7 +53,7 @@ python_problem <- function(python, timeout = 60, before = "") {
   if (is.na(run$status)) {
     return(paste0(not_started_reason(python), ", or does not answer in ", timeout, " s"))
   }
-  # An empty file that is a program ends in order, too.
+  # An empty executable file also ends with status 0.
   if (run$status != 0L || !nzchar(run$stdout)) refusal_reason(strsplit(run$stderr, "\n")[[1L]])
 }
 

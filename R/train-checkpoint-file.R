@@ -135,7 +135,7 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
     tryCatch(
       write(),
       error = function(cnd) {
-        # A full disk must not end hours of playing.
+        # Do not stop a long training because the disk is full.
         if (!failed) {
           warn_checkpoint(path, paste("cannot be written; the", what, "continues without it"),
                           x = conditionMessage(cnd))

@@ -284,8 +284,8 @@ exact_limit <- function(model, max_steps) {
 
 #' Compute how many steps of the training must lie between two exact evaluations
 #'
-#' So many that the evaluations take about a tenth of the time. It is a matter of counts alone: by a
-#' clock, the same seed could give another result. A step takes about as long as the new values of
+#' Choose it so that the evaluations take about a tenth of the time. Use counts and not a clock, so
+#' that a seed always gives the same result. A step takes about as long as the new values of
 #' 500 states. Where all the sweeps of an evaluation together take a millisecond, none is left out.
 #' @return A number of steps; `NULL` without a model.
 #' @noRd

@@ -88,7 +88,7 @@ training_log <- function(folder, settings, state, call) {
     new_evaluations <- evaluation_lines(state, evaluated + 1L)[-1L]
     logged <<- state$iteration
     evaluated <<- length(state$evaluations)
-    # A full disk must not end what has trained for hours.
+    # Do not stop a long training because the disk is full.
     tryCatch(
       {
         if (whole) {

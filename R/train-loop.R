@@ -254,11 +254,11 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
   show
 }
 
-# In seconds: when a training without a bar is told of, and how much must then be left.
+# Report a training without a progress bar after this many seconds, if at least so many are left.
 pace_after <- 5
 pace_left <- 60
 
-# These return whether they have told.
+# Return TRUE if a message was shown.
 inform_of_start <- function(episodes, elapsed) {
   tells <- elapsed >= pace_after && prints_times()
   if (tells) {
