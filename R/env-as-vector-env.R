@@ -1,8 +1,8 @@
 #' Convert an environment to a vector environment to play in
 #'
-#' All functions that play step by step use this interface: [rollout()] and every search call it, and
-#' use nothing else of an environment. Write a method for your own class to let all of them play another kind of
-#' environment.
+#' All functions that play step by step use this interface: [rollout()] and every search call it,
+#' and use nothing else of an environment. Write a method for your own class to let all of them
+#' play another kind of environment.
 #'
 #' An environment given by its id is made, and closed by `$close()`. It gets 256 sub-environments.
 #' It gets fewer if observations are large, so that all together take at most a mebibyte, but at

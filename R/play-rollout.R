@@ -26,8 +26,8 @@
 #' * a vector implementation such as CartPole's with a `num_envs` other than 256,
 #' * a server that is older than this package.
 #'
-#' **By Stable-Baselines3**: a policy of [learn_sb3()] that is no network of R plays whole episodes in
-#' a process of its own.
+#' **By Stable-Baselines3**: a policy of [learn_sb3()] that is no network of R plays whole episodes
+#' in a process of its own.
 #'
 #' Many episodes are played together in sub-environments, except with frames. The policy gets only
 #' the episodes that are still running, so a function gets fewer rows at the end.
