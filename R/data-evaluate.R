@@ -28,10 +28,11 @@
 #'
 #' Episodes are the unit. The bootstrap draws as many episodes as there are, with replacement,
 #' `replicates` times, and takes the percentiles of the estimates, a little further apart because
-#' episodes are few (the expanded percentile interval, Hesterberg 2015). `"fqe"` fits its regression again
-#' each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model of behavior is
-#' estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses the mean and the
-#' standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with known probabilities.
+#' episodes are few (the expanded percentile interval, Hesterberg 2015). `"fqe"` fits its
+#' regression again each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model
+#' of behavior is estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses
+#' the mean and the standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with
+#' known probabilities.
 #'
 #' @inheritParams learn_fitted_q
 #' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
