@@ -335,9 +335,7 @@ ask_description <- function(client, env_id, arguments, call) {
   )
   answer <- tryCatch(
     withCallingHandlers(
-      perform_request(
-        prepare_request(client, rollouts_route, fields = fields, repeatable = TRUE), call = call
-      ),
+      post_answer(client, rollouts_route, fields, repeatable = TRUE, call = call),
       gym_error_http_400 = function(cnd) explain_unknown_argument(cnd, names(arguments), call)
     ),
     gym_error_http = function(cnd) {

@@ -53,7 +53,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
 
 close_instance <- function(client, instance_id, call = rlang::caller_env()) {
   route <- paste0(instance_route(instance_id), "close/")
-  perform_request(prepare_request(client, route, once = TRUE), call = call)
+  post_answer(client, route, key = next_key(client_state(client)$keys), call = call)
   forget_instance(instance_place(client, instance_id))
   instances <- client_state(client)$instances
   if (!is.null(instances[[instance_id]])) rm(list = instance_id, envir = instances)
@@ -156,11 +156,11 @@ new_instance <- function(client, instance_id, about) {
   instance$name_observation <- naming(observed, batch = !is.null(about$num_envs))
   instance$actions <- sent_space(instance$single_action_space, about$num_envs)
   instance$observations <- sent_space(observed, about$num_envs)
-  instance$takes_tensors <- travels_as_tensors(observed, about$num_envs)
   instance$sends_tensors <- travels_as_tensors(instance$single_action_space, about$num_envs)
   instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
-  instance$takes_numbers <- takes_numbers(observed)
+  instance$streams <- pays_to_stream(observed, about$num_envs)
+  instance$takes_numbers <- instance$streams && takes_numbers(observed)
   instance$done <- FALSE
   # One for each combination of a call's flags, prepared at the first such call.
   instance$resets <- vector("list", 4L)

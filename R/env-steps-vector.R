@@ -17,41 +17,6 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-#' Prepare the steps of sub-environments
-#' @param which The numbers of those that step, `NULL` for all.
-#' @noRd
-prepare_vector_step <- function(instance, fields, which, named, infos) {
-  single <- instance$single_action_space
-  sends <- instance$sends_tensors
-  n <- instance$num_envs
-  if (length(which) && length(which) < n) {
-    fields <- c(fields, step_mask = json_array(json_atoms(seq_len(n) %in% which)))
-    n <- length(which)
-  }
-  actions <- batch_space(single, n)
-  observed <- batch_space(instance$single_observation_space, n)
-  read_observation <- observation_reader(instance, observed, named)
-  request <- prepare_instance_request(
-    instance, "step/", fields, named,
-    vector_step_reader(instance, read_observation, n, named, infos),
-    body = if (sends) new_tensors_body(fields, n) else new_json_body(fields),
-    sends_tensors = sends
-  )
-  request$which <- which
-  request$write <- if (sends) tensors_writer(single, n) else function(action) NULL
-  request$check_and_write <- function(action, call) {
-    action <- numbered_actions(instance, action, call)
-    action <- action_by_name(instance$single_action_space, action, instance$spec$id, call)
-    check_batch(single, actions, action, n, call, which)
-    if (sends) {
-      to_tensors(actions, action, "action", call)
-    } else {
-      paste0('"action":', write_batch(single, action, n), ",")
-    }
-  }
-  request
-}
-
 # Makes the function that reads the answer to a step of `n` sub-environments.
 vector_step_reader <- function(instance, read_observation, n, named, infos) {
   space <- instance$single_observation_space
@@ -83,7 +48,7 @@ final_observations <- function(instance, answer, n, named) {
   ended <- unlist(answer$final_sub_envs)
   check_final_sub_envs(ended, n)
   batch <- batch_space(instance$single_observation_space, length(ended))
-  read_final <- observation_reader(instance, batch, named, "final_obs")
+  read_final <- observation_reader(batch, naming_of(instance, named), "final_obs")
   list(sub_envs = ended + 1L, values = read_final(answer))
 }
 

@@ -7,8 +7,7 @@
 #' @noRd
 reset_instance <- function(instance, seed, options, return_info = FALSE, mask = NULL,
                            named = FALSE, infos = TRUE, call = rlang::caller_env()) {
-  client <- instance$client
-  close_queued(client)
+  close_queued(instance$client)
   fields <- c(
     seed = encode_seed(seed, instance$num_envs, call),
     options = if (!is.null(options)) {
@@ -21,34 +20,23 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
   slot <- 1L + named + 2L * infos
   request <- instance$resets[[slot]]
   if (is.null(request)) {
-    request <- list2env(prepare_reset(instance, named, infos), parent = emptyenv())
-    instance$resets[[slot]] <- request
+    request <- instance$resets[[slot]] <- prepare_reset(instance, named, infos)
   }
-  stream <- stream_of(instance)
-  message <- if (!is.null(stream$con) && !stream$busy) {
-    request$message %||% keep_message(request, reset_message(instance, request, stream, named))
-  }
-  content <- json_members(fields)
-  result <- if (is.list(message)) {
-    body <- request$body(content, NULL)
-    ask_stream(stream, message, body, message_head(length(body), 1L, 1L), call)
-  }
-  result <- if (is.list(result)) {
-    result[[1L]]
-  } else {
-    perform_request(request, content, call, key = stream_key(stream, result))
-  }
+  result <- ask_instance(instance, request, fields, call)
   instance$done <- FALSE
   if (return_info) result else result$observation
 }
 
 prepare_reset <- function(instance, named, infos) {
-  read_observation <- observation_reader(instance, instance$observations, named)
-  read <- function(answer) {
-    info <- read_info(answer, instance$num_envs)
-    list(observation = read_observation(answer), info = info)
-  }
-  prepare_instance_request(instance, "reset/", info_field(infos), named, read)
+  read_observation <- observation_reader(instance$observations, naming_of(instance, named))
+  rlang::env(
+    sends_tensors = FALSE, fields = info_field(infos),
+    content = function(fields, call) fields,
+    read = function(answer) {
+      list(observation = read_observation(answer), info = read_info(answer, instance$num_envs))
+    },
+    new_message = function(request, layout) reset_message(instance, request, layout, named)
+  )
 }
 
 #' Take a step
@@ -65,41 +53,12 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
   request <- instance$steps[[slot]]
   if (is.null(request) || !identical(request$which, which)) {
     check_which(which, instance, call)
-    request <- list2env(
-      prepare_step(instance, which, render, named, infos, finals), parent = emptyenv()
-    )
+    request <- prepare_step(instance, which, render, named, infos, finals)
     instance$steps[[slot]] <- request
   }
   # The action may itself take a step: evaluate it first.
   force(action)
-  stream <- stream_of(instance)
-  message <- if (!is.null(stream$con) && !stream$busy) {
-    if (is.null(request$message)) {
-      keep_message(
-        request, step_message(instance, request, stream, render, named, infos, finals)
-      )
-    } else {
-      request$message
-    }
-  }
-  result <- if (is.list(message)) {
-    content <- message$write(action)
-    head <- message$head
-    if (is.null(content)) {
-      content <- request$body(request$check_and_write(action, call), NULL)
-      head <- message_head(length(content), 0L, 1L + instance$sends_tensors)
-    }
-    ask_stream(stream, message, content, head, call)
-  }
-  result <- if (is.list(result)) {
-    result[[1L]]
-  } else {
-    content <- request$write(action) %||% request$check_and_write(action, call)
-    withCallingHandlers(
-      perform_request(request, content, call, key = stream_key(stream, result)),
-      gym_error_connection = function(cnd) check_ended
-    )
-  }
+  result <- ask_instance(instance, request, action, call, check_ended)
   # NA: the episode is over, and the warning has been given.
   if (is.null(instance$num_envs) && !is.na(instance$done)) {
     if (instance$done) {
@@ -112,68 +71,100 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
   result
 }
 
+#' Prepare a kind of steps
+#' @return An environment for [ask_instance()].
+#' @noRd
 prepare_step <- function(instance, which, render, named, infos, finals) {
-  fields <- c(
-    render = if (render) "true" else "false", info_field(infos),
-    final_obs = if (!finals) "false"
+  n <- instance$num_envs
+  selects <- length(which) && length(which) < n
+  # The number of those that step.
+  if (selects) n <- length(which)
+  single <- instance$single_action_space
+  actions <- sent_space(single, n)
+  read_observation <- observation_reader(
+    sent_space(instance$single_observation_space, n), naming_of(instance, named)
   )
-  if (is.null(instance$num_envs)) {
-    prepare_single_step(instance, fields, named)
-  } else {
-    prepare_vector_step(instance, fields, which, named, infos)
+  rlang::env(
+    sends_tensors = instance$sends_tensors, which = which,
+    fields = c(
+      render = if (render) "true" else "false", info_field(infos),
+      final_obs = if (!finals) "false",
+      step_mask = if (selects) json_array(json_atoms(seq_len(instance$num_envs) %in% which))
+    ),
+    content = function(action, call) {
+      action <- numbered_actions(instance, action, call)
+      action <- action_by_name(single, action, instance$spec$id, call)
+      if (is.null(n)) {
+        check_value(single, action, "", call)
+      } else {
+        check_batch(single, actions, action, n, call, which)
+      }
+      if (instance$sends_tensors) {
+        to_tensors(actions, action, "action", call)
+      } else {
+        c(action = if (is.null(n)) write_value(single, action) else write_batch(single, action, n))
+      }
+    },
+    read = if (is.null(n)) {
+      step_reader(read_observation)
+    } else {
+      vector_step_reader(instance, read_observation, n, named, infos)
+    },
+    new_message = function(request, layout) {
+      step_message(instance, request, layout, n, render, named, infos, finals)
+    }
+  )
+}
+
+#' Ask an instance for a reset or a step, by its stream or by HTTP
+#'
+#' @param request An environment with functions: `new_message` describes its messages; `content`
+#'   checks a value that these cannot write, and returns the fields of a body, or tensors; `read`
+#'   returns the result of an answer that they cannot read. And the constant `fields` of such a body
+#'   (JSON texts), and whether it `sends_tensors`.
+#' @param value The action, or the fields of a reset.
+#' @noRd
+ask_instance <- function(instance, request, value, call, check_ended = NULL) {
+  stream <- stream_of(instance)
+  by_http <- function(answer) {
+    withCallingHandlers(answer, gym_error_connection = function(cnd) check_ended)
   }
+  message <- request$message
+  if (is.null(message)) {
+    layout <- by_http(message_layout(stream, call))
+    message <- request$message <- request$new_message(request, layout)
+  }
+  content <- message$write(value)
+  head <- message$head
+  if (is.null(content)) {
+    content <- request_body(request, request$content(value, call))
+    head <- message_head(length(content), message$what, 1L + request$sends_tensors)
+  }
+  result <- if (!is.null(stream$con) && !stream$busy) {
+    ask_stream(stream, message, content, head, call)
+  }
+  if (is.list(result)) {
+    return(result[[1L]])
+  }
+  by_http(post_message(stream, message, content, head, result, call))
+}
+
+# What a message holds that is not an array.
+request_body <- function(request, content) {
+  if (!request$sends_tensors) {
+    return(json_body(c(content, request$fields)))
+  }
+  texts <- vapply(content, is.character, NA)
+  write_tensors(
+    content[!texts], c(request$fields, texts = if (any(texts)) to_json(content[texts]))
+  )
 }
 
 # The field that tells a server to make no infos.
 info_field <- function(infos) if (!infos) c(info = "false")
 
-#' Prepare the requests to one of an instance's routes
-#' @param body,sends_tensors As for [prepare_request()].
-#' @param read_answer A function of a parsed answer, which returns the result or raises an error.
-#' @noRd
-prepare_instance_request <- function(instance, route, fields, named, read_answer,
-                                     body = new_json_body(fields), sends_tensors = FALSE) {
-  read <- if (instance$takes_tensors) {
-    space <- instance$single_observation_space
-    labels <- if (named && inherits(space, "gym_space_box")) space$names
-    new_tensors_reader(read_answer, labels)
-  } else {
-    new_json_reader(read_answer)
-  }
-  prepare_request(
-    instance$client, paste0(instance$route, route), body = body, sends_tensors = sends_tensors,
-    takes_tensors = instance$takes_tensors || sends_tensors, once = TRUE, read = read,
-    result = read_answer
-  )
-}
-
-# Steps of a single environment --------------------------------------------------------------
-
-prepare_single_step <- function(instance, fields, named) {
-  actions <- instance$actions
-  sends <- instance$sends_tensors
-  read_observation <- observation_reader(instance, instance$observations, named)
-  request <- prepare_instance_request(
-    instance, "step/", fields, named, step_reader(instance, read_observation),
-    body = if (sends) new_tensors_body(fields) else new_json_body(fields),
-    sends_tensors = sends
-  )
-  request$write <- if (sends) function(action) NULL else json_writer(actions)
-  request$check_and_write <- function(action, call) {
-    action <- numbered_actions(instance, action, call)
-    action <- action_by_name(instance$single_action_space, action, instance$spec$id, call)
-    check_value(actions, action, "", call)
-    if (sends) {
-      to_tensors(actions, action, "action", call)
-    } else {
-      paste0('"action":', write_value(actions, action), ",")
-    }
-  }
-  request
-}
-
 # Makes the function that reads the answer to a step of a single environment.
-step_reader <- function(instance, read_observation) {
+step_reader <- function(read_observation) {
   function(answer) {
     if (!is.null(answer$tensors)) {
       check_answer_results(answer$tensors, 1L)
@@ -199,38 +190,26 @@ flags_and_reward <- c("reward", "terminated", "truncated")
 
 # Observations -------------------------------------------------------------------------------
 
+naming_of <- function(instance, named) if (named) instance$name_observation
+
 #' Make the function that reads an answer's observations
 #' @param space The observation space.
+#' @param name_observation A function that names them, `NULL` for none.
 #' @param name The answer's field, or the name of its tensors.
 #' @return A function of a parsed answer.
 #' @noRd
-observation_reader <- function(instance, space, named, name = "observation") {
-  read_json <- json_reader(space)
-  name_observation <- if (named) instance$name_observation
-  in_one <- inherits(space, c("gym_space_array", "gym_space_discrete"))
-  shape <- if (length(space$shape) > 1L) space$shape
-  n <- prod(space$shape)
-  read_any <- function(answer) {
-    if (is.null(answer$tensors)) {
-      decode_value(space, answer[[name]])
-    } else {
-      from_tensors(space, name, answer)
-    }
-  }
+observation_reader <- function(space, name_observation = NULL, name = "observation") {
+  what <- paste0("Its `", name, "`")
   function(answer) {
-    # The usual form, or NULL.
-    observation <- if (is.null(answer$tensors)) {
-      read_json(answer[[name]])
-    } else if (in_one) {
-      values <- answer$tensors[[name]]
-      if (length(values) == n && identical(dim(values), shape)) values
-    }
-    observation <- observation %||% read_values(read_any(answer), paste0("Its `", name, "`"))
-    if (is.null(name_observation) || isTRUE(answer$named)) {
-      observation
-    } else {
-      name_observation(observation)
-    }
+    observation <- read_values(
+      if (is.null(answer$tensors)) {
+        decode_value(space, answer[[name]])
+      } else {
+        from_tensors(space, name, answer)
+      },
+      what
+    )
+    if (is.null(name_observation)) observation else name_observation(observation)
   }
 }
 

@@ -1,5 +1,5 @@
-# What a step and a reset send by a stream, and how the answers are read. Usual answers are numbers
-# of one dtype, which R reads at once.
+# The messages of steps and resets, by a stream or by HTTP, and how the answers are read. Usual
+# answers are numbers of one dtype, which R reads at once.
 
 # With more numbers in an answer HTTP is faster: R reads from a socket in pieces of 4 kB.
 most_streamed <- 8000
@@ -22,25 +22,21 @@ takes_numbers <- function(space) {
 small_dtypes <- c("int8", "int16", "uint8", "uint16")
 
 #' Prepare the messages of a kind of steps
-#' @param request The prepared request by HTTP, an environment.
-#' @param stream An open stream.
+#' @param request The request that [ask_instance()] makes.
+#' @param layout From [message_layout()].
+#' @param n The number of sub-environments that step, `NULL` for a single environment.
 #' @return A list for [ask_stream()], with `write`, a function of an action that returns its bytes,
-#'   or `NULL` for one that `request` must check. `FALSE` if such steps go by HTTP.
+#'   or `NULL` for one that `request` must check.
 #' @noRd
-step_message <- function(instance, request, stream, render, named, infos, finals) {
+step_message <- function(instance, request, layout, n, render, named, infos, finals) {
   num_envs <- instance$num_envs
-  n <- if (is.null(num_envs) || is.null(request$which)) num_envs else length(request$which)
   selects <- !identical(n, num_envs)
-  numbers <- has_numbers(stream$layout$step)
-  if (!pays_to_stream(instance$single_observation_space, num_envs) || selects && !numbers) {
-    return(FALSE)
-  }
-  message <- if (numbers) {
+  message <- if (has_numbers(layout$step)) {
     space <- sent_space(instance$single_observation_space, n)
     count <- prod(space$shape) + 3 * (n %||% 1)
     numbers_message(request, count, step_reader_of_numbers(space, n, named))
   } else {
-    arrays_message(request, stream$layout$step)
+    arrays_message(request, layout_of_rows(layout$step, n, num_envs))
   }
   write <- array_writer(instance$single_action_space, n)
   message$write <- if (selects) {
@@ -50,40 +46,38 @@ step_message <- function(instance, request, stream, render, named, infos, finals
     write
   }
   flags <- sum(c(1L, 2L, 4L, 8L)[c(!infos, !finals, render, selects)])
-  sizes <- vapply(stream$layout$action, function(entry) entry$size, 0)
+  sizes <- vapply(layout$action, function(entry) entry$size, 0)
   size <- sum(sizes) / (num_envs %||% 1) * (n %||% 1) + if (selects) length(mask) else 0
   message$head <- message_head(size, 0L, 0L, flags)
+  message$what <- 0L
   message
 }
 
-reset_message <- function(instance, request, stream, named) {
-  n <- instance$num_envs
-  if (!pays_to_stream(instance$single_observation_space, n)) {
-    return(FALSE)
+# A layout of as many rows as there are sub-environments, for `n` of them.
+layout_of_rows <- function(layout, n, num_envs) {
+  if (identical(n, num_envs)) {
+    return(layout)
   }
-  if (!has_numbers(stream$layout$reset)) {
-    return(arrays_message(request, stream$layout$reset))
-  }
-  space <- sent_space(instance$single_observation_space, n)
-  count <- prod(space$shape)
-  observe <- observation_of_numbers(space, named)
-  numbers_message(request, count, function(numbers, json = NULL) {
-    list(observation = observe(numbers), info = read_info(json, n))
+  lapply(layout, function(entry) {
+    entry[c("n", "size")] <- lapply(entry[c("n", "size")], function(x) x / num_envs * n)
+    if (!is.null(entry$dim)) entry$dim[[1L]] <- as.integer(n)
+    entry
   })
 }
 
-# Keeps what is known of the messages of a prepared request. If a stream broke, and the answer is
-# asked for by HTTP, it comes as a message.
-keep_message <- function(request, message) {
-  result <- request$result
-  request$result <- function(answer) {
-    if (is.null(answer$message)) {
-      result(answer)
-    } else {
-      read_stream_answer(message, answer$message, NULL)
-    }
+reset_message <- function(instance, request, layout, named) {
+  n <- instance$num_envs
+  message <- if (has_numbers(layout$reset)) {
+    space <- sent_space(instance$single_observation_space, n)
+    observe <- observation_of_numbers(space, named)
+    numbers_message(request, prod(space$shape), function(numbers, json = NULL) {
+      list(observation = observe(numbers), info = read_info(json, n))
+    })
+  } else {
+    arrays_message(request, layout$reset)
   }
-  request$message <- message
+  # Its fields are always written as JSON.
+  c(message, list(write = function(fields) NULL, what = 1L))
 }
 
 # Answers of numbers ---------------------------------------------------------------------------
@@ -107,13 +101,15 @@ fewest_numbers <- 14L
 numbers_message <- function(request, count, read) {
   count <- before_numbers + max(count, fewest_numbers)
   size <- 8L * as.integer(count) - 4L
-  result <- request$result
   first <- as.raw(c(0x82, 0x7e, size %/% 256L, size %% 256L, 0, 0, 200, 0))
   list(
-    count = count, read = read, read_answer = result, url = request$url,
+    count = count, read = read, request = request,
     usual = readBin(first, "double", endian = "little"),
-    read_bytes = function(bytes, json) {
-      read(c(double(before_numbers), readBin(bytes, "double", count, endian = "little")), json)
+    read_bytes = function(content, json) {
+      # As with the head of a frame.
+      numbers <- readBin(c(raw(4L), content), "double", count, endian = "little")
+      if (length(numbers) < count) abort_answer("It has fewer numbers than its layout")
+      read(numbers, json)
     }
   )
 }
@@ -181,13 +177,12 @@ step_reader_of_numbers <- function(space, n, named) {
 #' Describe answers that are arrays of several dtypes
 #' @noRd
 arrays_message <- function(request, layout) {
-  layout <- list(entries = layout, data = 0L)
-  result <- request$result
+  layout <- list(entries = layout, data = message_head_size)
   list(
-    count = NULL, usual = NULL, read_answer = result, url = request$url,
-    read_bytes = function(bytes, json) {
+    count = NULL, usual = NULL, request = request,
+    read_bytes = function(content, json) {
       info <- json$info %||% empty_object
-      result(list(tensors = read_entries(bytes, layout), info = info, named = FALSE))
+      request$read(list(tensors = read_entries(content, layout), info = info))
     }
   )
 }

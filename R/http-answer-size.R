@@ -16,28 +16,6 @@ max_answer_bytes <- function(call = NULL) {
 # Answers up to this size are always accepted, because reading the option takes time in each call.
 small_answer <- 2^16
 
-#' Stop a handle if the answer is too large
-#'
-#' Compressed answers are not accepted: their size is unknown in advance, and libcurl decompresses
-#' all received bytes before it calls `xferinfofunction`, about ten times per request.
-#' @param state The client's. Its `too_large` says afterwards whether the request was stopped.
-#' @noRd
-limit_answer_size <- function(handle, state) {
-  set_curl(
-    handle,
-    accept_encoding = NULL,
-    noprogress = FALSE,
-    xferinfofunction = function(down, up) {
-      down[[2L]] <= small_answer || {
-        # An option that is not a number is reported after the request.
-        most <- answer_bytes_option()
-        state$too_large <- !is_number(most) || down[[2L]] > most
-        !state$too_large
-      }
-    }
-  )
-}
-
 # Checks the size of a JSON text before it is parsed.
 check_json_size <- function(content) {
   if (length(content) > small_answer && length(content) > max_answer_bytes() * json_share) {

@@ -136,17 +136,10 @@ listed_counts <- function(listed, name) {
 #' Check the numbers read for a space
 #' @param shape Its shape, or that of several values of it.
 #' @noRd
-check_numbers <- function(values, dtype, shape) {
-  n <- prod(shape)
-  if (length(values) != n) {
-    abort_answer(paste0(
-      "A value of shape ", shape_text(shape), " has ", count_of(length(values), "number")
-    ))
-  }
-  # NaN is a number.
-  missing <- anyNA(values) && any(is.na(values) & !is.nan(values))
-  if (!is.numeric(values) && !is.logical(values) || missing) {
-    abort_answer(paste("A value contains something that is not", dtype %||% "number"))
+check_numbers <- function(values, shape) {
+  # Only words for NaN and the infinities are read as numbers.
+  if (length(values) != prod(shape) || !is.numeric(values) && !is.logical(values)) {
+    abort_answer(paste("A value is not an array of numbers of shape", shape_text(shape)))
   }
   values
 }

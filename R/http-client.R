@@ -41,6 +41,75 @@ client_config <- function(client) {
   c(session, client$config)
 }
 
+# httr's timeout() takes precedence over the client's own.
+timeout_of <- function(client) {
+  configured <- client_config(client)$options$timeout_ms
+  if (is.null(configured)) client$timeout else configured / 1000
+}
+
+# The part of a client besides its address: what it knows of the server and of its instances, and
+# `home`, its connections. It is made again if the client is in another process or restored from a
+# file: connections are then void, and its idempotency keys belong to the original. `home` is also
+# made again after httr::set_config() or httr::reset_config().
+client_state <- function(client) {
+  state <- client$state
+  if (!identical(state$session, the_session) || state$pid != Sys.getpid()) {
+    suspendInterrupts({
+      # All clients of one server in one process share their keys: the server remembers a limited
+      # number for an instance, and a script may make a client for each call.
+      state$keys <- keys_of_place(client$remote_base)
+      state$home <- new.env(parent = emptyenv())
+      state$session_config <- getOption("httr_config")
+      state$instances <- new.env(parent = emptyenv())
+      state$creation_keys <- new_idempotency_keys()
+      state$server <- NULL
+      state$to_close <- character()
+      state$health <- NULL
+      # The process in which the client was first used.
+      state$made_in <- state$made_in %||% state$pid %||% Sys.getpid()
+      state$pid <- Sys.getpid()
+      state$session <- the_session
+    })
+  } else if (!identical(state$session_config, getOption("httr_config"))) {
+    suspendInterrupts({
+      state$home <- new.env(parent = emptyenv())
+      state$session_config <- getOption("httr_config")
+    })
+  }
+  state
+}
+
+# Makes a source of idempotency keys, by which the server recognises a repeated request: a random
+# text, and the number of the last request.
+new_idempotency_keys <- function() {
+  keys <- new.env(parent = emptyenv())
+  keys$key <- random_key()
+  keys$number <- 0
+  keys
+}
+
+# The keys that all clients and objects of one server, or of one instance, share, because numbers
+# must grow. A forked process has others.
+keys_of_place <- function(place) {
+  place <- paste(place, Sys.getpid())
+  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
+}
+
+# The idempotency key of the next request, for its field `request`.
+next_key <- function(keys) {
+  keys$number <- keys$number + 1
+  list(key = keys$key, number = keys$number)
+}
+
+# Unlike R's generator, this never returns the same text twice.
+random_key <- function() {
+  the_session$key_count <- (the_session$key_count %||% 0) + 1
+  rlang::hash(list(
+    Sys.info()[["nodename"]], Sys.getpid(), as.numeric(Sys.time()), tempfile(""),
+    the_session$key_count
+  ))
+}
+
 # The server's description of itself, a named list; `NULL` without such a route or without a client.
 # It is requested once.
 server_health <- function(client, call = rlang::caller_env()) {

@@ -32,15 +32,15 @@ create_on_server <- function(client, fields, call) {
 }
 
 create_once <- function(client, state, fields, call) {
-  request <- prepare_request(client, "/v1/envs/", fields = fields, once = TRUE)
   # A server that was started later must not create what an earlier one was asked for.
   key <- c(next_key(state$creation_keys), server = state$server)
   place <- paste(key$key, key$number)
   outcome <- "lost"
   on.exit(end_creation(state, place, outcome))
-  remember_instance(place, client, body = request$body(NULL, key))
+  body <- json_body(fields, key)
+  remember_instance(place, client, body = body)
   answer <- withCallingHandlers(
-    perform_request(request, call = call, key = key),
+    post_answer(client, "/v1/envs/", body = body, repeatable = TRUE, call = call),
     gym_error_http = function(cnd) outcome <<- "refused",
     gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
   )
@@ -215,15 +215,17 @@ close_together <- function(places, seconds) {
   deadline <- now() + seconds
   post <- function(entry, route, body, done) {
     left <- max(1, (deadline - now()) * 1000)
-    handle <- new_handle(entry$client, "post")
-    set_curl(handle, timeout_ms = left, connecttimeout_ms = left)
-    url <- paste0(entry$client$remote_base, route)
-    start_post(handle, url, body, pool, done, fail = function(reason) NULL)
+    line <- new_line(entry$client)
+    curl::handle_setopt(line$handle, timeout_ms = left, connecttimeout_ms = left)
+    set_line(line, "POST", body, json_type, json_type)
+    start_request(line, paste0(entry$client$remote_base, route), pool, function(response) {
+      if (!inherits(response, "error")) done(response)
+    })
   }
   close_place <- function(place) {
     entry <- the_session$instances[[place]]
     route <- paste0(instance_route(entry$instance_id), "close/")
-    post(entry, route, charToRaw("{}"), function(response) forget_instance(place))
+    post(entry, route, json_body(NULL), function(response) forget_instance(place))
   }
   ask_for_id <- function(place) {
     entry <- the_session$instances[[place]]

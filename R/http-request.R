@@ -1,223 +1,128 @@
-# Requests: the constant part is prepared and then performed. A step keeps its prepared request;
-# other calls prepare one for a single use.
+# Requests: one function sends them all, except for several at a time.
 
-#' Prepare a request
+#' Send a request and wait for the response
 #'
-#' @param fields JSON texts of the fields that its body always has, named.
-#' @param body A function of the other content of a body, and of the idempotency key, see
-#'   [new_json_body()] and [new_tensors_body()].
-#' @param sends_tensors,takes_tensors Whether its body is tensors, and whether the answer may be.
-#' @param once Whether it has an idempotency key, by which the server recognises a repeated request.
-#' @param repeatable Whether it may be made again if its connection broke.
-#' @param read A function of a response and the idempotency key that reads the usual kind of answer.
-#'   For any other answer it returns `NULL` or fails, and `result` handles it.
-#' @param result A function of a parsed answer, which returns the result or raises an error.
+#' @param route The path, after the client's address.
+#' @param body A raw vector, for a POST.
+#' @param sends,accepts The types of the body and of the answer.
+#' @param repeatable Whether it may be sent again if its connection broke: the server recognises it
+#'   by its idempotency key, or to do it twice changes nothing.
+#' @return As [curl::curl_fetch_memory()], for any status.
 #' @noRd
-prepare_request <- function(client, route, method = "POST", fields = NULL,
-                            body = new_json_body(fields), sends_tensors = FALSE,
-                            takes_tensors = FALSE, once = FALSE,
-                            repeatable = once || method == "GET",
-                            read = function(response, key) NULL, result = identity) {
-  list(
-    client = client, url = paste0(client$remote_base, route), method = method, body = body,
-    once = once, repeatable = repeatable, read = read, result = result,
-    kind = if (sends_tensors) {
-      "send_tensors"
+send_request <- function(client, route, method = "POST", body = raw(), sends = json_type,
+                         accepts = json_type, repeatable = method == "GET",
+                         call = rlang::caller_env()) {
+  # The body may hold the answer to another request, as in env_step(x, id,
+  # env_action_space_sample(x, id)). Make that one first.
+  force(body)
+  line <- line_of(client)
+  line$busy <- TRUE
+  on.exit(line$busy <- FALSE)
+  set_line(line, method, body, sends, accepts)
+  begun <- NULL
+  attempt <- 1L
+  reached <- FALSE
+  repeat {
+    response <- fetch(line, paste0(client$remote_base, route), call)
+    if (!inherits(response, "error")) {
+      client$state$may_prompt <- FALSE
+      return(response)
+    }
+    times <- curl::handle_data(line$handle)$times
+    begun <- begun %||% (now() - times[["total"]])
+    reached <- reached || times[["pretransfer"]] > 0
+    pause <- if (repeatable) pause_before_next(response, attempt)
+    if (!is.null(pause) && now() - begun + pause < timeout_of(client)) {
+      Sys.sleep(pause)
+      attempt <- attempt + 1L
+    } else if (prompted_server_starts(client, reached, call)) {
+      begun <- now()
+      attempt <- 1L
     } else {
-      paste0(if (method == "GET") "get" else "post", if (takes_tensors) "_tensors")
+      abort_connection(client$remote_base, conditionMessage(response), call, reached)
     }
-  )
+  }
 }
 
-#' Perform a request
-#'
-#' All requests of a client use this function, except for several at a time. A repeatable request
-#' whose connection broke is made again with the same idempotency key.
-#' @param request From [prepare_request()].
-#' @param content The other content of this body, besides the request's fields.
-#' @param key The idempotency key, a list of `key`, `number` and perhaps `server`, the server that
-#'   it is for; by default the connection's next.
-#' @return The result of `read` or `result` of the request.
-#' @noRd
-perform_request <- function(request, content = NULL, call = rlang::caller_env(), key = NULL) {
-  # The content may come from another request, as in env_step(x, id, env_action_space_sample(x,
-  # id)). Make that one first, while the connection is free.
-  force(content)
-  client <- request$client
-  connection <- client_state(client)$connection
-  if (connection$busy) {
-    connection <- inner_connection(connection)
-  }
-  connection$busy <- TRUE
-  on.exit(connection$busy <- FALSE)
-  handle <- connection$handles[[request$kind]] %||% add_handle(client, connection, request$kind)
-  if (request$once && is.null(key)) {
-    key <- next_key(connection$keys)
-  }
-  if (request$method == "POST") {
-    connection$body <- request$body(content, key)
-    size <- length(connection$body)
-    if (size != handle$body_size) set_body_size(handle, size)
-  }
-  result <- attempt_request(request, connection, handle, key)
-  if (is.null(attr(result, "unread"))) {
-    return(result)
-  }
-  response <- attr(result, "unread")
-  if (inherits(response, "error")) {
-    result <- repeat_request(request, connection, handle, key, response, call)
-    response <- attr(result, "unread")
-    if (is.null(response)) return(result)
-  }
-  answer <- read_answer(with_answer(response), request$method, call)
-  request$result(answer)
+# Sends a POST and reads its answer. With an idempotency key the server does it once.
+post_answer <- function(client, route, fields = NULL, key = NULL, body = json_body(fields, key),
+                        repeatable = !is.null(key), call = rlang::caller_env()) {
+  response <- send_request(client, route, "POST", body, repeatable = repeatable, call = call)
+  read_answer(with_answer(response), "POST", call)
 }
 
-#' Make one attempt at a request
-#'
-#' @return The result of `read` of the request. If there is none, an object with the attribute
-#'   "unread", which is the response or the connection's error.
-#' @noRd
-attempt_request <- function(request, connection, handle, key) {
-  state <- request$client$state
-  state$too_large <- FALSE
-  connection$sent <- 0L
-  response <- NULL
-  # Evaluating it returns from this function. tryCatch() would take three times as long.
-  delayedAssign("leave", return(structure(list(), unread = whole_response(response))))
-  withCallingHandlers(
-    {
-      response <- connection$fetch(request$url, handle$curl)
-      state$may_prompt <- FALSE
-      request$read(response, key) %||% leave
-    },
-    error = function(cnd) {
-      if (is.null(response)) response <<- cnd
-      leave
-    },
-    # Newer versions of curl signal an interrupt if an answer was stopped because of its size.
-    interrupt = function(cnd) {
-      if (state$too_large && is.null(response)) {
-        response <<- simpleError("Too large")
-        leave
-      }
-    }
-  )
-}
-
-# Calls ----------------------------------------------------------------------------------
-
-# Makes a POST without an idempotency key, and reads its answer.
-post_answer <- function(client, route, fields = NULL, call = rlang::caller_env()) {
-  perform_request(prepare_request(client, route, fields = fields), call = call)
-}
-
-# Makes a GET, and reads its answer.
+# Sends a GET and reads its answer.
 get_answer <- function(client, route, takes_tensors = FALSE, call = rlang::caller_env()) {
-  perform_request(
-    prepare_request(client, route, "GET", takes_tensors = takes_tensors), call = call
+  accepts <- if (takes_tensors) accepted_tensors else json_type
+  response <- send_request(client, route, "GET", accepts = accepts, call = call)
+  read_answer(with_answer(response), "GET", call)
+}
+
+#' Write a body in JSON
+#' @param fields JSON texts, named.
+#' @param key The idempotency key, a list as [next_key()] returns it.
+#' @return A raw vector. It has blanks at its end, so that most bodies of one route have one length:
+#'   curl takes as long to set the length as for half a request.
+#' @noRd
+json_body <- function(fields, key = NULL) {
+  bytes <- charToRaw(json_object(c(fields, request = key_json(key))))
+  c(bytes, rep(as.raw(0x20), -length(bytes) %% 64L))
+}
+
+key_json <- function(key) {
+  if (!is.null(key)) {
+    # The server that it is for, if that matters.
+    server <- if (!is.null(key$server)) paste0(',"server":', json_string(key$server))
+    sprintf('{"key":"%s","number":%.0f%s}', key$key, key$number, server %||% "")
+  }
+}
+
+# Attempts -------------------------------------------------------------------------------
+
+max_attempts <- 4L
+
+#' Decide whether and when to send a request again
+#'
+#' A busy server says when to ask again, but a single request does not wait for that.
+#' @param outcome The connection's error, or the response.
+#' @param attempt The number of attempts made.
+#' @return The seconds to wait, `NULL` to give up.
+#' @noRd
+pause_before_next <- function(outcome, attempt) {
+  if (!inherits(outcome, "error")) {
+    seconds_to_wait(outcome)
+  } else if (connection_broke(conditionMessage(outcome)) && attempt < max_attempts) {
+    0.1 * attempt
+  }
+}
+
+seconds_to_wait <- function(response) {
+  if (response$status_code == 429L) {
+    header <- curl::parse_headers_list(response$headers)[["retry-after"]]
+    seconds <- suppressWarnings(as.numeric(header %||% NA))
+    if (is_number(seconds) && seconds >= 0) min(seconds, 60)
+  }
+}
+
+# libcurl's messages for a lost connection, as opposed to one that could not be made or a timeout.
+connection_broke <- function(reason) {
+  grepl(
+    paste(
+      "Recv failure|Send failure|Empty reply|Server returned nothing|data rewind",
+      "Connection (reset|died)|Broken pipe|transfer closed",
+      "Failed (sending|receiving) data|Failure when receiving data",
+      sep = "|"
+    ),
+    reason
   )
 }
 
-#' Make a request and return any response
-#' @return As [curl::curl_fetch_memory()], for any status, with the parsed `answer`.
-#' @noRd
-any_response <- function(client, route, method = "POST", call = rlang::caller_env()) {
-  read <- function(response, key) {
-    if (!inherits(whole_response(response), "error")) with_answer(response)
-  }
-  perform_request(prepare_request(client, route, method, read = read), call = call)
-}
-
-# Bodies ---------------------------------------------------------------------------------
-
-# Bodies of a prepared request differ only in the idempotency key's number and the content.
-
-#' Make the function that writes a body in JSON
-#'
-#' @param fields JSON texts of the fields that it always has, named.
-#' @return A function of the members of a JSON object, each followed by a comma, and of the
-#'   idempotency key, which returns a raw vector. Without a key it has the fields only.
-#' @noRd
-new_json_body <- function(fields) {
-  of_key <- ending <- NULL
-  function(content, key) {
-    if (is.null(key)) {
-      return(charToRaw(paste0("{", sub(",$", "", paste0(content, json_members(fields))), "}")))
-    }
-    if (!identical(of_key, key$key)) {
-      server <- if (!is.null(key$server)) paste0('"server":', to_json(key$server), ",")
-      ending <<- paste0(
-        json_members(fields), '"request":{"key":"', key$key, '",', server, '"number":'
-      )
-      of_key <<- key$key
-    }
-    bytes <- charToRaw(paste0("{", content, ending, sprintf("%.0f}}", key$number)))
-    missing <- length(json_blanks) - length(bytes)
-    if (missing > 0L) c(bytes, json_blanks[seq_len(missing)]) else bytes
-  }
-}
-
-# curl needs the length of a body in advance, and setting it takes as long as half a request: small
-# bodies are padded to one length. Blanks at the end of a JSON text are ignored.
-json_blanks <- rep(as.raw(0x20), 256L)
-
-# Each member followed by a comma.
-json_members <- function(fields) {
-  if (length(fields)) paste0("\"", names(fields), "\":", fields, ",", collapse = "") else ""
-}
-
-key_json <- function(key) sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
-
-#' Make the function that writes a body of tensors
-#'
-#' @param n The number of integers, if the content is integers.
-#' @return A function like that of [new_json_body()]. Its content is a list as returned by
-#'   [to_tensors()], or integers, the tensor "action".
-#' @noRd
-new_tensors_body <- function(fields, n = NULL) {
-  of_integers <- if (!is.null(n)) {
-    write_table(list(action = list(dtype = "I32", shape = n, bytes = raw(4 * n))))
-  }
-  # The bytes before the tensors, split at the number of the idempotency key. They are kept as long
-  # as the number of digits does not change.
-  parts <- NULL
-  function(content, key) {
-    integers <- is.integer(content)
-    if (!integers && (is.null(key) || any(vapply(content, is.character, NA)))) {
-      texts <- vapply(content, is.character, NA)
-      # These are among the metadata, so the header differs each time.
-      fields <- c(fields, if (any(texts)) c(texts = to_json(content[texts])),
-                  if (!is.null(key)) c(request = key_json(key)))
-      return(write_tensors(content[!texts], fields))
-    }
-    table <- if (integers) of_integers else tensors_table(content)
-    digits <- charToRaw(sprintf("%.0f", key$number))
-    known <- length(digits) == length(parts$digits) && identical(parts$table, table) &&
-      identical(parts$key, key$key)
-    if (!known) parts <<- split_header(fields, table, key, digits)
-    header <- c(parts$before, digits, parts$after)
-    if (!integers) {
-      do.call(c, c(list(header), lapply(unname(content), `[[`, "bytes")))
-    } else if (length(content) < join_as_integers) {
-      c(header, writeBin(content, raw(), endian = "little"))
-    } else {
-      words <- readBin(header, "integer", length(header) / 4L, endian = "little")
-      writeBin(c(words, content), raw(), endian = "little")
-    }
-  }
-}
-
-# From this number on the header and integers are joined as integers, which R does faster.
-join_as_integers <- 1024L
-
-split_header <- function(fields, table, key, digits) {
-  header <- tensors_header(c(fields, request = key_json(key)), table)
-  # The quotes of the request are escaped in the header.
-  mark <- paste0('number\\":', rawToChar(digits))
-  end <- regexpr(mark, rawToChar(header[-(1:8)]), fixed = TRUE) + 8L + nchar(mark) - 1L
-  list(
-    table = table, key = key$key, digits = digits,
-    before = header[seq_len(end - length(digits))], after = header[-seq_len(end)]
-  )
+# Whether the user was asked and a server was started, at the first request of a client if nothing
+# listens at its address. Only clients of create_GymClient() ask. The function that asks belongs to
+# an upper layer and is registered by .onLoad().
+prompted_server_starts <- function(client, reached, call) {
+  state <- client$state
+  prompts <- !reached && isTRUE(state$may_prompt)
+  state$may_prompt <- FALSE
+  prompts && the_session$prompt_for_server(client, call)
 }

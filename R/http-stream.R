@@ -1,6 +1,6 @@
 # Streams: WebSockets for the steps and resets of one instance, on sockets of base R. The work that
-# curl and HTTP do for a request takes several times as long as a step. inst/server/PROTOCOL.md
-# describes the messages.
+# curl and HTTP do for a request takes several times as long as a step. Where there can be no stream
+# the same messages go by HTTP. inst/server/PROTOCOL.md describes them.
 
 # R allows about 128 open connections in a session.
 most_streams <- 32L
@@ -35,26 +35,21 @@ new_stream <- function(instance, state) {
   stream$config <- getOption("httr_config")
   stream$pid <- Sys.getpid()
   stream$session <- the_session
-  stream$route <- paste0(instance$route, "stream/")
-  stream$takes_numbers <- instance$takes_numbers
   stream$place <- instance_place(instance$client, instance$id)
   stream$keys <- keys_of_place(stream$place)
+  stream$route <- paste0(instance$route, "stream/?key=", stream$keys$key, "&order=column",
+                         if (instance$takes_numbers) "&numbers=float64")
   stream$busy <- FALSE
   stream$failures <- 0L
   stream$used <- 0
   # Why messages go by HTTP for good, in words.
-  stream$why_http <- why_http(instance$client)
+  stream$why_http <- why_http(instance$client) %||%
+    if (!instance$streams) "its answers are large"
   stream
 }
 
 is_own_stream <- function(stream) {
   !is.null(stream) && identical(stream$session, the_session) && stream$pid == Sys.getpid()
-}
-
-# Clients and objects of one instance share its keys, because numbers must grow.
-keys_of_place <- function(place) {
-  place <- paste(place, Sys.getpid())
-  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
 }
 
 #' Find out why the steps of a client's environments go by HTTP
@@ -94,7 +89,9 @@ open_stream <- function(stream) {
   failed <- tryCatch(
     suppressWarnings({
       con <- connect_stream(stream)
-      layout <- if (is_upgraded(stream, con)) read_first_message(con)
+      layout <- if (is_upgraded(stream, con)) {
+        read_layouts(from_json(rawToChar(read_message(con)$content)))
+      }
       is.null(layout)
     }),
     error = function(cnd) TRUE
@@ -147,10 +144,8 @@ connect_stream <- function(stream) {
   con <- socketConnection(
     host, port, open = "r+b", blocking = TRUE, options = "no-delay", timeout = min(10, timeout)
   )
-  query <- paste0("?key=", stream$keys$key, "&order=column",
-                  if (stream$takes_numbers) "&numbers=float64")
   lines <- c(
-    paste0("GET ", parts[[4L]], stream$route, query, " HTTP/1.1"),
+    paste0("GET ", parts[[4L]], stream$route, " HTTP/1.1"),
     paste0("Host: ", parts[[2L]], parts[[3L]]),
     "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
     paste0("Sec-WebSocket-Key: ", openssl::base64_encode(openssl::rand_bytes(16L))),
@@ -171,17 +166,21 @@ is_upgraded <- function(stream, con) {
     socketTimeout(con, ceiling(timeout_of(stream$client)))
     return(TRUE)
   }
-  if (grepl("^HTTP/1.1 (404|405|426) ", status)) {
-    stream$why_http <- stream$state$why_http <- "the server has none, or a proxy before it"
+  if (grepl("^HTTP/1.1 (200|426) ", status)) {
+    stream$why_http <- stream$state$why_http <- "a proxy before the server lets none pass"
   }
   FALSE
 }
 
-# The layout of actions, steps and resets, each as the entries of read_layout(); `NULL` for what has
-# no fixed layout.
-read_first_message <- function(con) {
-  message <- read_message(con)
-  tables <- from_json(rawToChar(message$content))
+# The layout of actions, steps and resets, which the server sends first.
+message_layout <- function(stream, call) {
+  stream$layout %||% (
+    stream$layout <- read_layouts(get_answer(stream$client, stream$route, call = call))
+  )
+}
+
+# Each layout as the entries of read_layout(); `NULL` for what has no fixed layout.
+read_layouts <- function(tables) {
   layout_of <- function(table) {
     if (!is.null(table)) Map(c, lapply(table, read_entry, TRUE), lapply(table, `[`, "dtype"))
   }
@@ -205,7 +204,7 @@ is_same_connection <- function(con) {
 #' Send a message by a stream and wait for its answer
 #'
 #' @param stream From [stream_of()], with a connection.
-#' @param message What is known of it and its answers, see [prepare_message()].
+#' @param message What is known of it and its answers, see [step_message()].
 #' @param content Its content after the number, a raw vector.
 #' @param head The frame's and the message's head.
 #' @return A list of one element: the result. If the stream broke, and the same must be asked by
@@ -232,7 +231,7 @@ ask_stream <- function(stream, message, content, head, call) {
     answer <- finish_answer(stream, answer, message$count, call)
     if (!is.null(answer)) {
       stream$busy <- FALSE
-      return(list(read_stream_answer(message, answer, call)))
+      return(list(read_stream_answer(stream, message, answer, call)))
     }
     drop_stream(stream)
     if (attempt > 1L || !is.null(stream$why_http) || !open_stream(stream)) break
@@ -255,11 +254,6 @@ exchange <- function(con, sent, count, broke = return(NULL)) {
     error = function(cnd) broke,
     warning = function(cnd) broke
   )
-}
-
-# The idempotency key of a request by HTTP: of its own, or of a message by a stream that broke.
-stream_key <- function(stream, number = NULL) {
-  if (is.null(number)) next_key(stream$keys) else list(key = stream$keys$key, number = number)
 }
 
 #' Read the rest of an answer
@@ -323,23 +317,57 @@ read_message <- function(con, begun = raw()) {
   list(first = begun[1L], content = begun[at + seq_len(size)])
 }
 
+# The bytes of an answer before its arrays.
+message_head_size <- 20L
+
 # Reads an answer that is not as usual: with infos, an error, or with other arrays.
-read_stream_answer <- function(message, content, call) {
+read_stream_answer <- function(stream, message, content, call) {
+  if (length(content) < message_head_size) {
+    abort_answer("It is shorter than the head of a message", call)
+  }
   head <- readBin(content, "integer", 4L, size = 2L, signed = FALSE, endian = "little")
-  json_size <- head[[3L]] + 65536 * head[[4L]]
-  rest <- content[-(1:20)]
   form <- head[[1L]] %% 256L
   if (form == 0L) {
-    size <- length(rest) - json_size
-    json <- if (json_size) json_answer(rest[size + seq_len(json_size)])
-    return(message$read_bytes(rest[seq_len(size)], json))
+    json_size <- head[[3L]] + 65536 * head[[4L]]
+    json <- if (json_size) json_answer(utils::tail(content, json_size))
+    return(message$read_bytes(content, json))
   }
   response <- list(
-    status_code = head[[2L]], content = rest, url = message$url,
+    status_code = head[[2L]], content = content[-seq_len(message_head_size)],
+    url = paste0(stream$client$remote_base, stream$route),
     type = if (form == 1L) json_type else column_tensors_type
   )
-  message$read_answer(read_answer(with_answer(response), "POST", call))
+  message$request$read(read_answer(with_answer(response), "POST", call))
 }
+
+#' Send a message by HTTP and wait for its answer
+#' @inheritParams ask_stream
+#' @param number Its number, if a stream broke after it was sent.
+#' @noRd
+post_message <- function(stream, message, content, head, number, call) {
+  keys <- stream$keys
+  number <- number %||% (keys$number <- keys$number + 1)
+  # Without the head of a frame.
+  head <- c(head[length(head) - 7:0], writeBin(number, raw(), endian = "little"))
+  body <- if (length(content) < join_as_integers || length(content) %% 4L) {
+    c(head, content)
+  } else {
+    writeBin(c(words_of(head), words_of(content)), raw(), endian = "little")
+  }
+  response <- send_request(
+    stream$client, stream$route, "POST", body, message_type, repeatable = TRUE, call = call
+  )
+  if (identical(response$type, message_type)) {
+    read_stream_answer(stream, message, response$content, call)
+  } else {
+    message$request$read(read_answer(with_answer(response), "POST", call))
+  }
+}
+
+# From this number of bytes on R joins them faster as integers.
+join_as_integers <- 4096L
+
+words_of <- function(bytes) readBin(bytes, "integer", length(bytes) / 4, endian = "little")
 
 #' Make the head of a message
 #' @param size The size of its content after the number, in bytes.

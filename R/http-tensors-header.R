@@ -11,21 +11,13 @@ header_size <- function(bytes) {
   size[[1L]]
 }
 
-# The largest table in bytes, as in a request to our server: enough for some ten thousand tensors,
-# which take some seconds to read.
-max_table_bytes <- 2^20
-
-# The start of the metadata: elsewhere, in names and texts, quotes are escaped.
-metadata_key <- ",\"__metadata__\":"
+# The most tensors, which take some seconds to read.
+most_tensors <- 2^14
 
 #' Read the header of a file
 #'
-#' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
-#'   are in R's order.
-#' @return The common part of all files with one layout, a list: `start`, their first bytes, up to
-#'   the metadata if these are last, as in our server's files; `entries`, the tensors in the order
-#'   of their bytes; `data`, the number of bytes before these; `total`, the number of all bytes;
-#'   `metadata_last`; and `metadata`, if they are not last.
+#' @return A list: `entries`, the tensors in the order of their bytes; `data`, the number of bytes
+#'   before these; `metadata`.
 #' @noRd
 read_layout <- function(bytes, by_column = FALSE) {
   data <- 8L + header_size(bytes)
@@ -34,36 +26,50 @@ read_layout <- function(bytes, by_column = FALSE) {
   if (any(header == as.raw(0L))) {
     abort_tensors("the header is no JSON")
   }
-  table <- rawToChar(header)
-  at <- regexpr(metadata_key, table, fixed = TRUE, useBytes = TRUE)
-  metadata_last <- at > 0L
-  if (metadata_last) {
-    table <- paste0(rawToChar(header[seq_len(at - 1L)]), "}")
-    header <- header[seq_len(at - 1L + nchar(metadata_key))]
+  # Our server writes the metadata last. What comes before is mostly the same as in the last file.
+  at <- regexpr(",\"__metadata__\":", rawToChar(header), fixed = TRUE, useBytes = TRUE)
+  table <- if (at > 0L) c(header[seq_len(at - 1L)], charToRaw("}")) else header
+  table <- c(as.raw(by_column), table)
+  if (!identical(last_table$bytes, table)) {
+    entries <- header_json(table[-1L])
+    last_table$read <- read_table(entries[names(entries) != "__metadata__"], by_column)
+    last_table$metadata <- entries[["__metadata__"]]
+    last_table$bytes <- table
   }
-  if (nchar(table, "bytes") > max_table_bytes) {
-    abort_tensors(paste("the table of tensors is larger than", count_of(max_table_bytes, "byte")))
+  metadata <- if (at > 0L) {
+    header_json(c(charToRaw("{"), header[-seq_len(at)]))[["__metadata__"]]
+  } else {
+    last_table$metadata
   }
-  entries <- tryCatch(
-    from_json(table),
-    error = function(cnd) abort_tensors("the header is no JSON")
-  )
-  if (!is.list(entries) || is.null(names(entries)) && length(entries)) {
-    abort_tensors("the header is no JSON object")
-  }
-  check_entry_names(names(entries))
-  tensors <- lapply(entries[names(entries) != "__metadata__"], read_entry, by_column)
-  begins <- vapply(tensors, function(entry) entry$begin, 0)
-  sizes <- vapply(tensors, function(entry) as.double(entry$size), 0)
-  tensors <- tensors[check_filled(begins, begins + sizes)]
-  if (sum(sizes) != length(bytes) - data) {
-    abort_tensors(paste("the tensors have", count_of(sum(sizes), "byte"), "and the file",
+  read <- last_table$read
+  if (read$size != length(bytes) - data) {
+    abort_tensors(paste("the tensors have", count_of(read$size, "byte"), "and the file",
                         length(bytes) - data))
   }
-  list(
-    start = c(bytes[1:8], header), entries = tensors, data = data, total = length(bytes),
-    metadata_last = metadata_last, metadata = entries[["__metadata__"]]
+  list(entries = read$entries, data = data, metadata = metadata)
+}
+
+last_table <- new.env(parent = emptyenv())
+
+header_json <- function(bytes) {
+  json <- tryCatch(
+    from_json(rawToChar(bytes)), error = function(cnd) abort_tensors("the header is no JSON")
   )
+  if (!is_object(json)) {
+    abort_tensors("the header is no JSON object")
+  }
+  check_entry_names(names(json))
+  json
+}
+
+read_table <- function(entries, by_column) {
+  if (length(entries) > most_tensors) {
+    abort_tensors(paste("there are more than", count_of(most_tensors, "tensor")))
+  }
+  entries <- lapply(entries, read_entry, by_column)
+  begins <- vapply(entries, function(entry) entry$begin, 0)
+  sizes <- vapply(entries, function(entry) as.double(entry$size), 0)
+  list(entries = entries[check_filled(begins, begins + sizes)], size = sum(sizes))
 }
 
 check_entry_names <- function(names) {
@@ -108,28 +114,13 @@ read_entry <- function(entry, by_column) {
   }
   # R indexes a vector faster by integers than by doubles.
   whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
-  place_entry(list(
-    read = type$read, n = n, shape = as.integer(shape), by_column = by_column,
-    begin = offsets[[1L]], size = whole(size)
-  ))
-}
-
-#' Decide how to give a tensor's numbers their shape
-#' @param labels The names of the numbers in a row, `NULL` for none.
-#' @return The entry with `attributes`, if these are enough, or with `place`, a function of the
-#'   numbers.
-#' @noRd
-place_entry <- function(entry, labels = NULL) {
-  shape <- entry$shape
-  if (length(shape) == 2L && !is.null(labels)) {
-    labels <- list(NULL, labels)
-  }
-  if (length(shape) <= 1L) {
-    entry$attributes <- if (!is.null(labels)) list(names = labels)
-  } else if (entry$by_column) {
-    entry$attributes <- c(list(dim = rev(shape)), if (!is.null(labels)) list(dimnames = labels))
-  } else {
-    entry$place <- function(values) place_by_row(values, shape, labels)
+  shape <- as.integer(shape)
+  entry <- list(
+    read = type$read, n = n, dim = if (length(shape) > 1L) rev(shape), begin = offsets[[1L]],
+    size = whole(size)
+  )
+  if (!by_column && length(shape) > 1L) {
+    entry$place <- function(values) place_by_row(values, shape)
   }
   entry
 }

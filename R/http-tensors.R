@@ -7,21 +7,14 @@
 #' Read a safetensors file
 #'
 #' @param bytes A raw vector.
-#' @param layout The file's layout, from [read_layout()].
+#' @param by_column Whether the tensors are transposed and their shapes reversed, so that the bytes
+#'   are in R's order.
 #' @return A list of `tensors`, a named list of vectors and arrays, and `metadata`, a named list of
 #'   strings.
 #' @noRd
-read_tensors <- function(bytes, layout = read_layout(bytes)) {
-  metadata <- layout$metadata
-  if (layout$metadata_last) {
-    # The header after its start.
-    text <- rawToChar(bytes[(length(layout$start) + 1L):layout$data])
-    metadata <- tryCatch(
-      from_json(paste0("{\"last\":", text))$last,
-      error = function(cnd) abort_tensors("the metadata are no JSON")
-    )
-  }
-  list(tensors = read_entries(bytes, layout), metadata = metadata)
+read_tensors <- function(bytes, by_column = FALSE) {
+  layout <- read_layout(bytes, by_column)
+  list(tensors = read_entries(bytes, layout), metadata = layout$metadata)
 }
 
 # Up to this size tensors are read by an index, from a larger file by a connection of R, which
@@ -51,9 +44,7 @@ read_entries <- function(bytes, layout) {
       values <- entry$place(values)
     } else {
       if (is.raw(values)) values <- as.integer(values)
-      if (!is.null(entry$attributes)) {
-        attributes(values) <- entry$attributes
-      }
+      if (!is.null(entry$dim)) dim(values) <- entry$dim
     }
     entries[[i]] <- values
     if (!large) before <- before + entry$size
@@ -62,14 +53,9 @@ read_entries <- function(bytes, layout) {
 }
 
 # Bytes become integers after reordering.
-place_by_row <- function(values, shape, labels = NULL) {
-  if (is.raw(values)) {
-    array(as.integer(shape_values(values, shape)), shape, labels)
-  } else if (length(shape) > 2L) {
-    shape_values(values, shape)
-  } else {
-    matrix(values, shape[[1L]], shape[[2L]], byrow = TRUE, dimnames = labels)
-  }
+place_by_row <- function(values, shape) {
+  values <- shape_values(values, shape)
+  if (is.raw(values)) array(as.integer(values), shape) else values
 }
 
 # The types -----------------------------------------------------------------------
@@ -170,37 +156,9 @@ half_from_double <- function(x) {
 #'   one length.
 #' @noRd
 write_tensors <- function(tensors, metadata) {
-  do.call(c, c(
-    list(tensors_header(metadata, tensors_table(tensors))), lapply(unname(tensors), `[[`, "bytes")
-  ))
-}
-
-tensors_header <- function(metadata, table) {
-  # In a JSON text no other characters need escaping.
-  quoted <- gsub("\\", "\\\\", enc2utf8(metadata), fixed = TRUE)
-  quoted <- gsub("\"", "\\\"", quoted, fixed = TRUE)
-  about <- paste0("\"", names(metadata), "\":\"", quoted, "\"", collapse = ",")
-  header <- charToRaw(paste0("{\"__metadata__\":{", about, "}", table, "}"))
-  header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
-  length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
-  c(length_bytes, header)
-}
-
-# The last table of tensors written: from step to step it is the same.
-written <- new.env(parent = emptyenv())
-
-tensors_table <- function(tensors) {
-  forms <- lapply(tensors, function(tensor) tensor[c("dtype", "shape")])
-  if (!identical(forms, written$last$forms)) {
-    written$last <- list(forms = forms, table = write_table(tensors))
-  }
-  written$last$table
-}
-
-write_table <- function(tensors) {
   sizes <- vapply(tensors, function(tensor) as.double(length(tensor$bytes)), 0)
   ends <- cumsum(sizes)
-  entries <- vapply(seq_along(tensors), function(i) {
+  table <- vapply(seq_along(tensors), function(i) {
     tensor <- tensors[[i]]
     sprintf(
       ",%s:{\"dtype\":\"%s\",\"shape\":[%s],\"data_offsets\":[%.0f,%.0f]}",
@@ -208,5 +166,11 @@ write_table <- function(tensors) {
       ends[[i]] - sizes[[i]], ends[[i]]
     )
   }, "")
-  paste(entries, collapse = "")
+  # In a JSON text no other characters need escaping.
+  metadata[] <- paste0("\"", gsub("([\"\\\\])", "\\\\\\1", enc2utf8(metadata)), "\"")
+  header <- paste0(c("{\"__metadata__\":", json_object(metadata), table, "}"), collapse = "")
+  header <- charToRaw(header)
+  header <- c(header, rep(as.raw(0x20), -length(header) %% 64L))
+  length_bytes <- writeBin(c(length(header), 0L), raw(), size = 4L, endian = "little")
+  do.call(c, c(list(length_bytes, header), lapply(unname(tensors), `[[`, "bytes")))
 }

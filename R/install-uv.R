@@ -111,9 +111,9 @@ fetch_uv <- function(call) {
   cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
   handle <- curl::new_handle()
   # A download ends if it stays below this many bytes per second for so many seconds.
-  set_curl(handle, low_speed_limit = 100, low_speed_time = 60)
+  curl::handle_setopt(handle, low_speed_limit = 100, low_speed_time = 60)
   certificates <- Sys.getenv("SSL_CERT_FILE")
-  if (nzchar(certificates)) set_curl(handle, cainfo = certificates)
+  if (nzchar(certificates)) curl::handle_setopt(handle, cainfo = certificates)
   tryCatch(
     curl::curl_download(url, archive, handle = handle),
     error = function(cnd) {

@@ -11,12 +11,8 @@ play_requests <- function(play) {
   vector_env <- play$vector_env
   known <- vector_env$known
   play$size <- first_size(play)
-  request <- prepare_request(
-    vector_env$client, rollouts_route, body = function(content, key) content,
-    sends_tensors = TRUE, repeatable = TRUE
-  )
   perform_several(
-    request,
+    vector_env$client, rollouts_route,
     next_content = function() {
       piece <- take_piece(play)
       if (!is.null(piece)) c(piece, list(body = episodes_body(play, piece)))

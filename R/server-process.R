@@ -210,14 +210,13 @@ terminate_server <- function(server) {
 probe_server <- function(base, timeout) {
   client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE))
   response <- tryCatch(
-    any_response(client, "/v1/envs/", "GET"), gym_error_connection = function(cnd) NULL
+    with_answer(send_request(client, "/v1/envs/", "GET")), gym_error_connection = identity
   )
-  times <- curl::handle_data(client$state$connection$handles$get$curl)$times
   answer <- response$answer
   list(
-    listens = !is.null(response) || times[["connect"]] > 0,
+    listens = !isFALSE(response$reached),
     is_gym = !is.null(answer$all_envs) || identical(answer$code, "unauthorized"),
-    name = if (!is.null(response)) server_name(response)
+    name = server_name(response)
   )
 }
 

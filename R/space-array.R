@@ -85,7 +85,7 @@ space_bounds.gym_space_multibinary <- function(space) {
 
 #' @exportS3Method
 decode_value.gym_space_array <- function(space, json) {
-  values <- check_numbers(decode_numbers(space$dtype, json), space$dtype, space$shape)
+  values <- check_numbers(decode_numbers(space$dtype, json), space$shape)
   shape_values(values, space$shape)
 }
 

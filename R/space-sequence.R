@@ -9,7 +9,7 @@ is_stackable <- function(space) {
 decode_stack <- function(space, json) {
   if (is_stackable(space)) {
     shape <- c(length(json), space$shape)
-    shape_values(check_numbers(decode_numbers(space$dtype, json), space$dtype, shape), shape)
+    shape_values(check_numbers(decode_numbers(space$dtype, json), shape), shape)
   } else {
     lapply(json, decode_value, space = space)
   }

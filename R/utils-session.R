@@ -4,8 +4,7 @@
 #   servers         the servers that this session started, by their addresses
 #   client          the client of the session's own server; named_client that of GYM_SERVER_URL
 #   instances       the instances that this session has created on servers, see http-instances.R
-#   curl_names      curl's names of its options, see set_curl()
-#   keys            the idempotency keys of this process, see http-connection.R
+#   keys            the idempotency keys of this process, see keys_of_place()
 #   environments    the environments written in R that are registered, by their ids
 #   hidden          tokens, which errors must not show
 #   reference_blas  whether R multiplies matrices by its own library, see has_reference_blas()

@@ -16,8 +16,8 @@ local_bad_environment <- function(..., frame = parent.frame()) {
       auto_unbox = TRUE
     )),
     "/v1/envs/0a1b2c3d/" = list(text = jsonlite::toJSON(about, auto_unbox = TRUE)),
-    "/v1/envs/0a1b2c3d/reset/" = list(text = '{"observation":[0,1],"info":{}}'),
-    "/v1/envs/0a1b2c3d/step/" = list(text = good_step()),
+    # Asked for the layout of messages it is one that has no arrays.
+    "/v1/envs/0a1b2c3d/stream/" = list(text = good_step()),
     "/v1/envs/0a1b2c3d/close/" = list(status = 200, text = "{}")
   ), frame = frame)
 }

@@ -112,11 +112,14 @@ test_that("what cannot be a query or a body is refused by name before it is sent
   }
 })
 
+# Steps and resets by HTTP.
+messages_to <- function(id) paste0("POST /v1/envs/", id, "/stream/")
+
 test_that("a step whose answer was lost is not taken twice", {
   server <- local_server()
-  client <- local_cut_client(server, "answered", "/step")
-  id <- env_create(client, "CartPole-v1", seed = 1)
-  env_reset(client, id)
+  id <- env_create(server, "CartPole-v1", seed = 1)
+  env_reset(server, id)
+  client <- local_cut_client(server, "answered", messages_to(id))
   first <- env_step(client, id, 1)
   expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
 
@@ -140,9 +143,9 @@ test_that("creating is not done twice, nor is closing", {
 test_that("a call that was cut before it was sent is made", {
   skip_unless_all()
   server <- local_server()
-  client <- local_cut_client(server, "unsent", "/step", times = 2)
-  id <- env_create(client, "CartPole-v1", seed = 1)
-  env_reset(client, id)
+  id <- env_create(server, "CartPole-v1", seed = 1)
+  env_reset(server, id)
+  client <- local_cut_client(server, "unsent", messages_to(id), times = 2)
   expect_equal(env_step(client, id, 1)$reward, 1)
   expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
 })
@@ -150,9 +153,9 @@ test_that("a call that was cut before it was sent is made", {
 test_that("a connection that breaks each time is an error in the end", {
   skip_unless_all()
   server <- local_server()
-  client <- local_cut_client(server, "answered", "/step", times = 100)
-  id <- env_create(client, "CartPole-v1")
-  env_reset(client, id)
+  id <- env_create(server, "CartPole-v1")
+  env_reset(server, id)
+  client <- local_cut_client(server, "answered", messages_to(id), times = 100)
   expect_error(env_step(client, id, 1), class = "gym_error_connection")
   expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
 })
@@ -181,7 +184,7 @@ test_that("a client survives saveRDS() and makes calls of its own", {
   expect_equal(env_step(copies[[2]], id, 1)$reward, 1)
   expect_equal(env_step(client, id, 0)$reward, 1)
   # Of one process all have one key, and no number of it twice.
-  keys <- lapply(c(list(client), copies), function(copy) copy$state$connection$keys)
+  keys <- lapply(c(list(client), copies), function(copy) copy$state$keys)
   expect_identical(keys[[2]], keys[[1]])
   expect_identical(keys[[3]], keys[[1]])
 })
@@ -199,7 +202,7 @@ test_that("a client works in forked workers", {
   skip_on_os("windows")
   client <- test_client()
   env_list_all(client)
-  key <- function(...) client_state(client)$connection$keys$key
+  key <- function(...) client_state(client)$keys$key
   keys <- c(key(), unlist(parallel::mclapply(1:2, key, mc.cores = 2)))
   expect_length(unique(keys), 3)
   answers <- parallel::mclapply(1:4, function(seed) {
@@ -259,9 +262,9 @@ test_that("a call inside another call disturbs neither", {
   env_reset(server, id)
   env_reset(server, twin)
   # curl asks R for a call's body, and there R may run finalizers: here it does.
-  connection <- client_state(server)$connection
-  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {
-    if (connection$sent == 0L) {
+  line <- line_of(server)
+  curl::handle_setopt(line$handle, readfunction = function(nbytes, ...) {
+    if (line$sent == 0L) {
       thrown_away <- new.env()
       reg.finalizer(thrown_away, function(x) {
         env_close(server, env_create(server, "CartPole-v1"))
@@ -269,7 +272,7 @@ test_that("a call inside another call disturbs neither", {
       rm(thrown_away)
       gc()
     }
-    body_reader(connection)(nbytes)
+    body_reader(line)(nbytes)
   })
   other <- create_GymClient(server$remote_base)
   for (action in c(1, 0, 1)) {
@@ -284,11 +287,11 @@ test_that("a call of one client inside another's disturbs neither", {
   other <- create_GymClient(server$remote_base)
   id <- env_create(server, "CartPole-v1", seed = 1)
   env_reset(server, id)
-  connection <- client_state(server)$connection
+  line <- line_of(server)
   made <- NULL
-  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {
-    if (connection$sent == 0L) made <<- c(made, env_create(other, "CartPole-v1"))
-    body_reader(connection)(nbytes)
+  curl::handle_setopt(line$handle, readfunction = function(nbytes, ...) {
+    if (line$sent == 0L) made <<- c(made, env_create(other, "CartPole-v1"))
+    body_reader(line)(nbytes)
   })
   expect_equal(env_step(server, id, 1)$reward, 1)
   expect_equal(env_step(server, id, 0)$reward, 1)
@@ -307,7 +310,7 @@ output_of_script <- function(...) {
   processx::run(file.path(R.home("bin"), "Rscript"), script, timeout = 60)$stdout
 }
 
-test_that("an interrupt that jumps out of libcurl leaves a client that works", {
+test_that("no interrupt jumps out of libcurl", {
   skip_unless_all()
   skip_on_os("windows")
   skip_if_no_server()
@@ -317,15 +320,13 @@ test_that("an interrupt that jumps out of libcurl leaves a client that works", {
     "server <- create_GymClient(server$remote_base, config = httr::add_headers(a = 'b'))",
     "id <- env_create(server, 'CartPole-v1')",
     "invisible(env_reset(server, id))",
-    "connection <- gym:::client_state(server)$connection",
+    "line <- gym:::line_of(server)",
     "interrupted <- works <- 0",
     "for (wait in 1:60) {",
-    "  curl::handle_setopt(connection$handles$post$curl, readfunction = function(nbytes, ...) {",
-    "    body <- gym:::body_reader(connection)(nbytes)",
-    "    suspendInterrupts({",
-    "      gctorture2(1e6L, wait)",
-    "      tools::pskill(Sys.getpid(), tools::SIGINT)",
-    "    })",
+    "  curl::handle_setopt(line$handle, readfunction = function(nbytes, ...) {",
+    "    body <- gym:::body_reader(line)(nbytes)",
+    "    gctorture2(1e6L, wait)",
+    "    tools::pskill(Sys.getpid(), tools::SIGINT)",
     "    body",
     "  })",
     "  tryCatch({",
@@ -333,7 +334,7 @@ test_that("an interrupt that jumps out of libcurl leaves a client that works", {
     "    Sys.sleep(0.5)",
     "  }, interrupt = function(cnd) interrupted <<- interrupted + 1)",
     "  gctorture2(0L)",
-    "  rm(list = 'post', envir = connection$handles)",
+    "  curl::handle_setopt(line$handle, readfunction = gym:::body_reader(line))",
     "  other <- create_GymClient(server$remote_base)",
     "  reset <- post_request(other, paste0('/v1/envs/', id, '/reset/'))$observation",
     "  works <- works + (length(reset) == 4 && env_step(server, id, 1)$reward == 1)",

@@ -77,7 +77,7 @@ expect_taken_once <- function(way) {
   }
 }
 
-test_that("a step that was cut at any byte is taken once, as JSON and as tensors", {
+test_that("a step by HTTP that was cut at any byte is taken once", {
   skip_unless_all()
   expect_taken_once(NULL)
 })

@@ -2,11 +2,11 @@
 local_requests <- function(frame = parent.frame()) {
   asked <- new.env()
   asked$routes <- character()
-  local_functions(perform_request = local({
-    perform <- gym:::perform_request
-    function(request, ...) {
-      asked$routes <- c(asked$routes, paste(request$method, basename(request$url)))
-      perform(request, ...)
+  local_functions(send_request = local({
+    send <- gym:::send_request
+    function(client, route, method = "POST", ...) {
+      asked$routes <- c(asked$routes, paste(method, basename(route)))
+      send(client, route, method, ...)
     }
   }), frame = frame)
   asked

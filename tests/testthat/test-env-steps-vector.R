@@ -323,7 +323,6 @@ test_that("a step before the first reset is an error, and a closed environment s
 test_that("values of vector environments travel as tensors where their space has them", {
   env <- local_env("CartPole-v1", num_envs = 2)
   instance <- known_instance(env$client, env$instance_id)
-  expect_true(instance$takes_tensors)
   expect_true(instance$sends_tensors)
   sequence <- new_space(list(name = "Sequence", space = describe_box(0, 1)))
   expect_false(travels_as_tensors(sequence, 2))

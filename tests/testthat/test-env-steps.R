@@ -35,18 +35,6 @@ test_that("an action in another form than the last one is checked and sent", {
   expect_error(poles$step(1), class = "gym_error_space")
 })
 
-test_that("a header is prepared for numbers of any length", {
-  for (n in c(3L, join_as_integers)) {
-    body <- new_tensors_body(c(render = "false"), n)
-    integers <- rep_len(0:2, n)
-    for (number in c(1, 9, 10, 99999, 1e15)) {
-      file <- read_tensors(body(integers, list(key = "key", number = number)))
-      expect_identical(file$tensors$action, integers)
-      expect_identical(file$metadata$request, sprintf('{"key":"key","number":%.0f}', number))
-    }
-  }
-})
-
 test_that("tensors by column are what tensors by row are", {
   for (dtype in c("U8", "I64", "F32", "F64")) {
     values <- array(1:24, 2:4)
@@ -55,8 +43,7 @@ test_that("tensors by column are what tensors by row are", {
       write_tensors(list(x = list(dtype = dtype, shape = shape, bytes = write(flat))), c(a = ""))
     }
     by_row <- read_tensors(file(2:4, row_major(values)))
-    bytes <- file(4:2, as.vector(values))
-    by_column <- read_tensors(bytes, read_layout(bytes, by_column = TRUE))
+    by_column <- read_tensors(file(4:2, as.vector(values)), by_column = TRUE)
     expect_identical(by_column, by_row)
     expect_equal(by_row$tensors$x, values)
   }

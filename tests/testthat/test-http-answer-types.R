@@ -46,7 +46,7 @@ test_that("a step's answer may have numbers that are none", {
   server <- local_bad_environment()
   env_reset(server, "0a1b2c3d")
   words <- good_step(reward = '"NaN"', observation = '["Infinity","NaN"]', info = '{"a":"NaN"}')
-  say(server, "/v1/envs/0a1b2c3d/step/" = answers(words))
+  say(server, "/v1/envs/0a1b2c3d/stream/" = answers(words))
   out <- env_step(server, "0a1b2c3d", 1)
   expect_identical(out$reward, NaN)
   expect_identical(out$observation, c(Inf, NaN))
@@ -67,15 +67,15 @@ test_that("a step's answer says which field is wrong", {
     c(observation = "[0,{}]"), c(observation = "[0.5]"), c(observation = "[0.5,1,2]")
   )
   for (field in wrong) {
-    say(server, "/v1/envs/0a1b2c3d/step/" = answers(good_step(field)))
+    say(server, "/v1/envs/0a1b2c3d/stream/" = answers(good_step(field)))
     expect_wrong(env_step(server, "0a1b2c3d", 1), names(field))
   }
-  say(server, "/v1/envs/0a1b2c3d/step/" = answers(good_step()))
+  say(server, "/v1/envs/0a1b2c3d/stream/" = answers(good_step()))
   expect_identical(env_step(server, "0a1b2c3d", 1)$observation, c(0, 1))
   # A reset is read in the same way.
-  say(server, "/v1/envs/0a1b2c3d/reset/" = answers('{"observation":[1],"info":{}}'))
+  say(server, "/v1/envs/0a1b2c3d/stream/" = answers('{"observation":[1],"info":{}}'))
   expect_wrong(env_reset(server, "0a1b2c3d"), "observation")
-  say(server, "/v1/envs/0a1b2c3d/reset/" = answers('{"observation":[1,1],"info":"x"}'))
+  say(server, "/v1/envs/0a1b2c3d/stream/" = answers('{"observation":[1,1],"info":"x"}'))
   expect_wrong(env_reset(server, "0a1b2c3d"), "info")
 })
 
@@ -93,7 +93,7 @@ test_that("a step's answer of a vector environment has an element for each", {
     given <- c(...)
     fields[names(given)] <- given
     route <- list(answers(json_object(fields)))
-    names(route) <- at("step/")
+    names(route) <- at("stream/")
     do.call(say, c(list(server), route))
     env_step(server, "0a1b2c3d", c("a", "b"))
   }
@@ -123,7 +123,7 @@ test_that("tensors have the shape of their space", {
   )
   step <- function(...) {
     route <- list(tensors_answer_of(with_field(good, ...)))
-    names(route) <- at("step/")
+    names(route) <- at("stream/")
     do.call(say, c(list(server), route))
     env_step(server, "0a1b2c3d", 1)
   }
@@ -136,7 +136,7 @@ test_that("tensors have the shape of their space", {
   expect_wrong(step(terminated = float64(1)), "terminated")
   expect_wrong(step(truncated = flags(c(TRUE, FALSE), 2L)), "truncated")
   without <- list(tensors_answer_of(good[c("observation", "reward", "truncated")]))
-  names(without) <- at("step/")
+  names(without) <- at("stream/")
   do.call(say, c(list(server), without))
   expect_wrong(env_step(server, "0a1b2c3d", 1), "terminated")
 })
@@ -149,7 +149,7 @@ test_that("tensors of a vector environment have a row for each", {
   )
   step <- function(...) {
     route <- list(tensors_answer_of(with_field(good, ...)))
-    names(route) <- at("step/")
+    names(route) <- at("stream/")
     do.call(say, c(list(server), route))
     env_step(server, "0a1b2c3d", c(0, 1, 0))
   }
@@ -206,7 +206,7 @@ test_that("values of nested spaces have their form", {
   for (kind in names(wrong)) {
     for (json in wrong[[kind]]) {
       answer <- list(observation = from_json(json))
-      expect_wrong(observation_reader(list(), spaces[[kind]], FALSE)(answer), "")
+      expect_wrong(observation_reader(spaces[[kind]])(answer), "")
     }
   }
 })

@@ -120,7 +120,7 @@ test_that("an environment that was closed is not closed again", {
   expect_false(instance_place(server, id) %in% ls(the_session$instances))
   gone <- gym_make("CartPole-v1", client = server)
   route <- paste0("/v1/envs/", gone$instance_id, "/close/")
-  perform_request(prepare_request(server, route, once = TRUE))
+  post_answer(server, route)
   expect_error(gone$close(), NA)
   expect_false(instance_place(server, gone$instance_id) %in% ls(the_session$instances))
 })
@@ -211,9 +211,8 @@ test_that("a client goes on with a server that was started later at its address"
   expect_false(identical(client_state(client)$server, known))
   # What the first one was asked for is not made again.
   fields <- c(env_id = "\"CartPole-v1\"")
-  request <- prepare_request(client, "/v1/envs/", fields = fields, once = TRUE)
   key <- list(key = "k", number = 1, server = known)
-  expect_error(perform_request(request, key = key), class = "gym_error_http_410")
+  expect_error(post_answer(client, "/v1/envs/", fields, key), class = "gym_error_http_410")
   expect_named(env_list_all(later), id)
 })
 

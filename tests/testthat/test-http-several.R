@@ -1,19 +1,13 @@
 # A request of which several are under way at once.
 
-description_request <- function(client) {
-  prepare_request(
-    client, rollouts_route, body = function(content, key) content, repeatable = TRUE
-  )
-}
-
-describe_body <- function(id) charToRaw(json_object(c(env_id = json_string(id))))
+describe_body <- function(id) json_body(c(env_id = json_string(id)))
 
 # One of them alone.
 description <- function(client, id = "Acrobot-v1") {
   contents <- list(list(body = describe_body(id)))
   answer <- NULL
   perform_several(
-    description_request(client),
+    client, rollouts_route, sends = json_type,
     next_content = function() {
       content <- if (length(contents)) contents[[1]]
       contents <<- list()
@@ -33,7 +27,7 @@ test_that("answers come to their requests, and no more are under way than allowe
   given <- got <- character()
   open <- 0L
   perform_several(
-    description_request(client),
+    client, rollouts_route, sends = json_type,
     next_content = function() {
       i <- length(given) + 1L
       if (i > length(ids)) {

@@ -77,13 +77,10 @@ test_that("a number that the dtype does not hold is no action, and names its pla
   expect_identical(length(to_tensors(narrow, Inf, "action", NULL)), 1L)
 })
 
-test_that("large observations and all frames travel as tensors, small ones do not", {
+test_that("large observations arrive as integers, in their shape", {
   client <- test_client()
-  asks <- function(env) known_instance(client, env$instance_id)$takes_tensors
-  expect_false(asks(local_env("CartPole-v1")))
   skip_if_not(env_registry(client, "CarRacing-v3")$available[1], "the extra box2d")
   env <- local_env("CarRacing-v3", seed = 1)
-  expect_true(asks(env))
   observation <- env$reset()
   expect_type(observation, "integer")
   expect_identical(dim(observation), c(96L, 96L, 3L))

@@ -13,7 +13,6 @@ play_mirror <- function(env, tensors) {
   instance <- known_instance(env$client, env$instance_id)
   # Calls were prepared for the other way.
   instance$resets[] <- instance$steps[] <- list(NULL)
-  instance$takes_tensors <- tensors
   # An empty Tuple or Dict would be a file without a tensor, and no action in it.
   empty <- all(all_kinds(env$action_space) %in% c("Tuple", "Dict"))
   instance$sends_tensors <- tensors && !empty

@@ -142,7 +142,7 @@ test_that("the request stands in the error's parent, not in its text", {
   cnd <- expect_error(env$step(3), "not in Discrete(2)", fixed = TRUE)
   own <- paste(c(cnd$message, cnd$body), collapse = "\n")
   expect_false(grepl("POST", own))
-  expect_match(conditionMessage(cnd$parent), "POST http.*/step/ \\[400 Bad Request\\]")
+  expect_match(conditionMessage(cnd$parent), "POST http.*/stream/.* \\[400 Bad Request\\]")
 })
 
 test_that("a table for observations that cannot be counted is refused by the call", {

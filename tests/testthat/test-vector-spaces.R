@@ -14,7 +14,6 @@ play_sub_envs <- function(env, values, tensors) {
   instance <- known_instance(env$client, env$instance_id)
   # Calls were prepared for the other way.
   instance$resets[] <- instance$steps[] <- list(NULL)
-  instance$takes_tensors <- instance$takes_tensors && tensors
   instance$sends_tensors <- instance$sends_tensors && tensors
   n <- env$num_envs
   observation <- env$reset(seed = seq_len(n))

@@ -90,7 +90,7 @@ draw_scale <- function(heights, labels, values) {
 # How the contenders for a step are drawn, by their names in wire_names.
 step_styles <- data.frame(
   name = c("bare", "parsed", "gym"),
-  label = c("the same bytes", "and parsed", "env$step()"),
+  label = c("the same bytes", "and read", "env$step()"),
   colour = c("black", "grey50", gym_colour)
 )
 

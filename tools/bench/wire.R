@@ -2,7 +2,7 @@
 # same bytes and knows nothing of environments: what R's own calls add.
 
 wire_names <- c(
-  gym = "gym, env$step()", parsed = "bare handle, parsed and checked", bare = "bare handle"
+  gym = "gym, env$step()", parsed = "bare handle, read and checked", bare = "bare handle"
 )
 
 compare_steps <- function(python, turns, steps) {
@@ -33,7 +33,7 @@ single_step_contenders <- function(client, recorder) {
   bare <- bare_step(client, recorder, NULL)
   list(
     step_contender(0, "gym", "env$step(a)", play_env_steps(env, 1L)),
-    step_contender(0, "parsed", "curl_fetch_memory(), parse_json()", function(steps) {
+    step_contender(0, "parsed", "curl_fetch_memory(), readBin()", function(steps) {
       play_bare_steps(bare, steps, read_step)
     }),
     step_contender(0, "bare", "curl_fetch_memory()", function(steps) {
@@ -105,11 +105,12 @@ bare_step <- function(client, recorder, num_envs) {
     env$step(actions)
     ask(recorder, "last")
   })
-  path <- sub("^POST (\\S+) .*", "\\1", requests[[1L]]$head)
+  # With a key of the bench's own.
+  path <- sub("^POST (\\S+)[?]key=[^&]*(\\S+) .*", "\\1?key=bench\\2", requests[[1L]]$head)
   bare <- new.env()
   bare$env <- env
   bare$url <- paste0(client$remote_base, path)
-  bare$templates <- lapply(requests, function(one) body_template(jsonlite::base64_dec(one$body)))
+  bare$messages <- lapply(requests, function(one) jsonlite::base64_dec(one$body))
   bare$number <- 1e5
   bare$size <- -1
   bare$handle <- curl::new_handle(
@@ -149,27 +150,10 @@ recorded_headers <- function(head) {
   c(headers[!tolower(names(headers)) %in% own], Expect = "")
 }
 
-# A body in parts: the JSON text that has the idempotency key, with a key of the bench's own, and
-# for safetensors the bytes of the tensors after it.
-body_template <- function(body) {
-  tensors <- body[[1L]] != charToRaw("{")
-  header <- if (tensors) readBin(body, "integer", 1L, endian = "little") else length(body)
-  before <- if (tensors) 8L else 0L
-  text <- rawToChar(body[before + seq_len(header)])
-  key <- regmatches(text, regexec("key\\\\*\":\\\\*\"([0-9a-f]+)", text))[[1L]][2L]
-  digits <- strsplit(key, "")[[1L]]
-  list(
-    text = sub(key, paste(rev(digits), collapse = ""), text, fixed = TRUE), tensors = tensors,
-    size = nchar(text), data = body[-seq_len(before + header)]
-  )
-}
-
-# The body with an idempotency key's number, as long as the recorded one where it ends in blanks.
-numbered_body <- function(template, number) {
-  text <- sub("(number\\\\*\":)[0-9]+", sprintf("\\1%.0f", number), template$text)
-  text <- sprintf("%-*s", template$size, sub(" +$", "", text))
-  size <- if (template$tensors) writeBin(c(nchar(text), 0L), raw(), endian = "little")
-  c(size, charToRaw(text), template$data)
+# A message with a number of the bench's own.
+numbered_message <- function(message, number) {
+  message[9:16] <- writeBin(number, raw(), endian = "little")
+  message
 }
 
 # The bodies are made beforehand.
@@ -180,7 +164,7 @@ play_bare_steps <- function(bare, steps, read) {
     function() {
       bare$env$reset(seed = 1)
       bodies <<- lapply(seq_len(steps_to_reset), function(i) {
-        numbered_body(bare$templates[[1L + i %% 2L]], bare$number + i)
+        numbered_message(bare$messages[[1L + i %% 2L]], bare$number + i)
       })
       bare$number <- bare$number + steps_to_reset
     },
@@ -197,14 +181,10 @@ check_status <- function(response) {
 # What a careful client of a few lines does with the answer.
 read_step <- function(response) {
   check_status(response)
-  answer <- jsonlite::parse_json(rawToChar(response$content))
-  observation <- as.numeric(unlist(answer$observation))
-  stopifnot(
-    length(observation) == 4L, is.numeric(answer$reward), is.logical(answer$terminated),
-    is.logical(answer$truncated), is.list(answer$info)
-  )
+  numbers <- readBin(c(raw(4L), response$content), "double", 17L, endian = "little")
+  stopifnot(length(numbers) == 17L, numbers[9:10] %in% 0:1)
   list(
-    observation = observation, reward = answer$reward,
-    done = answer$terminated || answer$truncated, info = answer$info
+    observation = numbers[4:7], reward = numbers[[8L]], terminated = numbers[[9L]] == 1,
+    truncated = numbers[[10L]] == 1, done = any(numbers[9:10] == 1), info = list()
   )
 }

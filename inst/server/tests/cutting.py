@@ -2,7 +2,7 @@
 
 For tests. ``python cutting.py SERVER_PORT [stream]`` runs a proxy for clients in other processes.
 It prints its port and then reads commands: ``request 17`` or ``answer 170`` sets where to cut the
-next request to a step, or its response; ``none`` cuts nothing. It answers each with a line: the
+next message by HTTP, or its response; ``none`` cuts nothing. It answers each with a line: the
 number of cuts, and the sizes of the last complete request and response. With ``stream`` these are
 the messages of streams; without it no stream can be opened.
 """
@@ -190,7 +190,7 @@ class NumberedClient:
 
 
 def main():
-    cutter = Cutter(int(sys.argv[1]), streams=sys.argv[2:] == ["stream"])
+    cutter = Cutter(int(sys.argv[1]), b"/stream/", streams=sys.argv[2:] == ["stream"])
     print(cutter.address[1], flush=True)
     for line in sys.stdin:
         where, _, after = line.strip().partition(" ")

@@ -43,11 +43,12 @@ class Call(NamedTuple):
     Attributes:
         services: the services.
         path: the variable parts of the URL.
-        body: the JSON object of the request, or the query of a GET.
+        body: the JSON object of the request, or the query of a GET or of a route that reads bytes.
         fields: the values of the route's fields; None for missing ones.
         form: the format of tensors that the client wants, if the route supports them.
         is_connected: returns whether the client still waits for a response.
         environ: the request's head, as a WSGI environ.
+        raw: the bytes of the body, on a route that reads them itself.
     """
 
     services: Services
@@ -57,6 +58,7 @@ class Call(NamedTuple):
     form: AnswerForm = JSON_FORM
     is_connected: Callable[[], bool] = lambda: True
     environ: Mapping[str, Any] = MappingProxyType({})
+    raw: bytes = b""
 
     @property
     def instance(self) -> Instance:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header
@@ -43,7 +43,7 @@ class Endpoint:
         self._fields = (REQUEST, *route.fields) if route.once else route.fields
         self._is_tensors = route.tensor_body and TENSORS in environ["CONTENT_TYPE"]
         self._read: Callable[[bytes], dict] = bodies.loads
-        if route.method == "GET":
+        if route.method == "GET" or route.raw_body:
             self._read = partial(_query, environ)
         elif self._is_tensors:
             names = frozenset(field.name for field in self._fields)
@@ -71,7 +71,7 @@ class Endpoint:
             return failure(error, fields.get("request"))
         match, form = self._match, self._form
         call = Call(
-            self._services, match.variables, body, fields, form, is_connected, self._environ
+            self._services, match.variables, body, fields, form, is_connected, self._environ, raw
         )
         if request_id is None:
             return self._perform(call, None)[0]
@@ -104,7 +104,13 @@ class Endpoint:
 
 def _query(environ: dict, raw: bytes) -> dict[str, str | list[str]]:
     """Return a query's fields; a repeated one becomes a list, which no field accepts."""
-    lists = Request(environ).args.lists()
+    return dict(_parsed_query(environ["QUERY_STRING"]))
+
+
+# Each message of a stream that is sent by HTTP has the query of the one before.
+@lru_cache(maxsize=128)
+def _parsed_query(query: str) -> dict[str, str | list[str]]:
+    lists = Request({"QUERY_STRING": query}).args.lists()
     return {name: values[0] if len(values) == 1 else values for name, values in lists}
 
 

@@ -1,12 +1,15 @@
-"""The open streams: an instance has one, the last that was opened."""
+"""The open streams: an instance has one, the last that was opened. And what messages look like."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from weakref import WeakKeyDictionary
 
 from gym_server.api.exactly_once import ExactlyOnce
+from gym_server.api.stream_layout import StreamLayout
+from gym_server.instances.instance import Instance
 
 
 class OpenStreams:
@@ -24,6 +27,17 @@ class OpenStreams:
         self._lock = threading.Lock()
         # Functions that end them.
         self._ends: dict[str, Callable[[], None]] = {}
+        self._layouts: WeakKeyDictionary[Instance, dict[tuple[bool, bool], StreamLayout]] = (
+            WeakKeyDictionary()
+        )
+
+    def layout(self, instance: Instance, by_column: bool, as_float64: bool) -> StreamLayout:
+        """Return the layout of an instance's messages; it is found once, see ``StreamLayout``."""
+        layouts = self._layouts.setdefault(instance, {})
+        form = by_column, as_float64
+        if form not in layouts:
+            layouts[form] = StreamLayout(instance, by_column, as_float64)
+        return layouts[form]
 
     @contextmanager
     def added(self, instance_id: str, end: Callable[[], None]) -> Iterator[None]:

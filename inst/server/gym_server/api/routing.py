@@ -47,6 +47,7 @@ class Route:
         content_type: the content type of an ordinary response.
         tensors: whether the response may be tensors, if the client accepts them.
         tensor_body: whether the body may be tensors.
+        raw_body: whether the handler reads the body, and the fields are those of the query.
         refusal_page: makes a page, from a path and a status, that people who may not call the route
             get instead of an error in JSON; None for no page.
     """
@@ -61,6 +62,7 @@ class Route:
     content_type: str = JSON
     tensors: bool = False
     tensor_body: bool = False
+    raw_body: bool = False
     refusal_page: Callable[[str, int], Response] | None = None
 
 

@@ -2,7 +2,7 @@
 
 A message is done once: its number is kept with the stream's key in the table of the idempotency
 keys of HTTP requests. So what was asked by a stream that broke can be asked again by another
-stream, or by HTTP.
+stream, or by HTTP: a POST with a message is answered, too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from gym_server.api.stream_layout import (
     RESET,
     STEP,
     TENSOR_BODY,
-    StreamLayout,
     malformed_message,
 )
 from gym_server.api.websocket import (
@@ -57,7 +56,7 @@ _LARGEST_NUMBER = 2.0**53
 
 
 class Stream:
-    """Answers the messages of one client about one instance."""
+    """Answers the messages of one client about one instance, by a WebSocket or one by one."""
 
     def __init__(self, call: Call, key: str, by_column: bool, as_float64: bool) -> None:
         """Prepare the stream.
@@ -73,7 +72,7 @@ class Stream:
         self._instance_id = self._instance.instance_id
         self._key = key
         self._by_column = by_column
-        self._layout = StreamLayout(self._instance, by_column, as_float64)
+        self._layout = call.services.streams.layout(self._instance, by_column, as_float64)
         self._was_taken_over = False
 
     def serve(self, client: socket.socket, rest: bytes) -> None:
@@ -98,8 +97,26 @@ class Stream:
         with contextlib.suppress(OSError):
             client.shutdown(socket.SHUT_RD)
 
+    def layout(self) -> Response:
+        """Return the layout of messages, as the first message says it."""
+        return Response(200, self._layout.first_message())
+
     def _answer(self, message: bytes) -> bytes:
-        """Return the answer to a message."""
+        """Return the answer to a message, as a message."""
+        response, number = self.respond(message)
+        if response.content_type == MESSAGE:
+            return response.body
+        if response.content_type == JSON:
+            head = ANSWER_HEAD.pack(JSON_BODY, response.status, 0, number)
+            return head + self._layout.padded(response.body)
+        return ANSWER_HEAD.pack(TENSOR_BODY, response.status, 0, number) + response.body
+
+    def respond(self, message: bytes) -> tuple[Response, float]:
+        """Do what a message asks for; return the response in HTTP's words, and the number.
+
+        Raises:
+            ProtocolError: it is no message.
+        """
         if len(message) < REQUEST_HEAD.size:
             raise ProtocolError(UNSUPPORTED, f"a message has at least {REQUEST_HEAD.size} bytes")
         what, form, flags, number = REQUEST_HEAD.unpack_from(message)
@@ -114,12 +131,7 @@ class Stream:
             )
         except Exception as error:
             response = failure(error)
-        if response.content_type == MESSAGE:
-            return response.body
-        if response.content_type == JSON:
-            head = ANSWER_HEAD.pack(JSON_BODY, response.status, 0, number)
-            return head + self._layout.padded(response.body)
-        return ANSWER_HEAD.pack(TENSOR_BODY, response.status, 0, number) + response.body
+        return response, number
 
     def _perform(
         self, what: int, form: int, flags: int, number: float, data: bytes

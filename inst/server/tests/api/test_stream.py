@@ -151,6 +151,45 @@ def test_a_number_is_done_once_by_either_way(shared, opened):
     assert again.arrays(again.step(1, number=4)[2])["observation"] == [3]
 
 
+def test_a_message_by_http_is_answered_as_by_a_stream(shared, opened):
+    fields = {"num_envs": 3, "seed": 1, "vectorization_mode": "sync"}
+    ours, theirs = (shared.create("CartPole-v1", **fields) for _ in range(2))
+    stream = opened(theirs, order="column")
+    path = f"{ours}/stream/?key=k&order=column"
+    assert shared.get(path)[1] == stream.layout
+
+    def posted(message):
+        with contextlib.closing(shared.connect()) as connection:
+            connection.request("POST", path, message)
+            answer = connection.getresponse()
+            return answer.status, answer.headers["Content-Type"], answer.read()
+
+    actions = struct.pack("<3q", 0, 1, 1)
+    for what, form, content, flags in (
+        (RESET, JSON_BODY, b"{}", 0),
+        (STEP, ARRAYS, actions, 0),
+        (STEP, ARRAYS, bytes([1, 0, 1]) + bytes(5) + actions[:16], 8),
+    ):
+        message = stream.message(what, form, content, flags)
+        stream.socket.sendall(frame(message))
+        wanted = stream.receive_frame()[1]
+        # Asked again it is not done again, and neither is it by a stream.
+        for _ in range(2):
+            assert posted(message) == (200, "application/x-gym-message", wanted)
+    again = opened(ours, order="column")
+    again.socket.sendall(frame(message))
+    assert again.receive_frame()[1] == wanted
+    # What is no array is a response of HTTP.
+    for sent, status, code in (
+        (message[:-8], 409, "request_conflict"),
+        (b"short", 400, "malformed_message"),
+        (stream.message(STEP, JSON_BODY, b"{}"), 400, "missing_parameter"),
+    ):
+        refused, kind, body = posted(sent)
+        assert (refused, kind) == (status, "application/json")
+        assert json.loads(body)["code"] == code
+
+
 def test_the_second_stream_takes_over_and_the_first_is_told(opened):
     first = opened()
     first.reset()
@@ -239,7 +278,8 @@ def test_only_who_may_use_the_server_opens_a_stream(attacked, ask):
     foreign = raw_http.request("GET", path, b"", token).replace(b"127.0.0.1", b"example.org")
     for request, status, code in (
         (foreign, 403, "foreign_host"),
-        (raw_http.request("GET", path, b"", token), 426, "upgrade_required"),
+        (raw_http.request("GET", path, b"", token, "Upgrade: h2c"), 426, "upgrade_required"),
+        (raw_http.request("POST", path, b""), 401, "unauthorized"),
         (stream_client.upgrade("/v1/envs/abc/stream/", token), 400, "unknown_instance"),
         (stream_client.upgrade(f"{path}?order=row", token), 400, "invalid_parameter"),
         (stream_client.upgrade(f"{path}?key=%20", token), 400, "invalid_parameter"),
