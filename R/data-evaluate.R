@@ -27,10 +27,12 @@
 #' # Intervals
 #'
 #' Episodes are the unit. The bootstrap draws as many episodes as there are, with replacement,
-#' `replicates` times, and takes the percentiles of the estimates. `"fqe"` fits its regression again
-#' each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model of behavior is
-#' estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses the mean and the
-#' standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with known probabilities.
+#' `replicates` times, and takes the percentiles of the estimates, a little further apart because
+#' episodes are few (the expanded percentile interval, Hesterberg 2015). `"fqe"` fits its
+#' regression again each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model
+#' of behavior is estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses
+#' the mean and the standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with
+#' known probabilities.
 #'
 #' @inheritParams learn_fitted_q
 #' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
@@ -71,11 +73,12 @@
 #'   two episodes.
 #' @section Warnings: `gym_warning_offline` if the estimate depends on few episodes, or on actions
 #'   that the data never took in some states.
-#' @references N. Jiang, L. Li (2016), Doubly robust off-policy value evaluation for reinforcement
-#'   learning, ICML. H. Le, C. Voloshin, Y. Yue (2019), Batch policy learning under constraints,
-#'   ICML. D. Precup, R. Sutton, S. Singh (2000), Eligibility traces for off-policy policy
-#'   evaluation, ICML. P. Thomas, E. Brunskill (2016), Data-efficient off-policy policy evaluation
-#'   for reinforcement learning, ICML.
+#' @references T. Hesterberg (2015), What teachers should know about the bootstrap, The American
+#'   Statistician 69. N. Jiang, L. Li (2016), Doubly robust off-policy value evaluation for
+#'   reinforcement   learning, ICML. H. Le, C. Voloshin, Y. Yue (2019), Batch policy learning under
+#'   constraints,   ICML. D. Precup, R. Sutton, S. Singh (2000), Eligibility traces for off-policy
+#'   policy   evaluation, ICML. P. Thomas, E. Brunskill (2016), Data-efficient off-policy policy
+#'   evaluation   for reinforcement learning, ICML.
 #' @export
 #' @examples
 #' set.seed(1)
@@ -222,13 +225,13 @@ warn_few_episodes <- function(result) {
 
 new_offline <- function(design, method, estimated, draws, level) {
   steps <- design$steps
-  tail <- (1 - level) / 2
+  tail <- bootstrap_tail(design, level)
   rows <- lapply(rlang::set_names(method), function(one) {
     estimate <- estimated$estimates[[one]]
     if (is.null(draws)) {
       mean_interval(episode_scores(estimated$parts, one)[, 1L], level)
     } else {
-      ends <- stats::quantile(draws[, one], c(tail, 1 - tail), names = FALSE)
+      ends <- stats::quantile(draws[, one], c(tail, 1 - tail), names = FALSE, type = 6)
       c(estimate, stats::sd(draws[, one]), ends)
     }
   })
@@ -245,6 +248,15 @@ new_offline <- function(design, method, estimated, draws, level) {
     ),
     class = "gym_offline"
   )
+}
+
+# A bootstrap percentile interval of few episodes is too short: without this it is that of a mean by
+# the normal distribution and a variance divided by n (Hesterberg 2015).
+bootstrap_tail <- function(design, level) {
+  n <- design$steps$episodes
+  strata <- length(unique(design$stratum))
+  own <- n / strata
+  stats::pnorm(sqrt(own / (own - 1)) * stats::qt((1 - level) / 2, n - strata))
 }
 
 effective_number <- function(weights) {

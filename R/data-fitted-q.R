@@ -109,14 +109,21 @@ fit_rule <- function(steps, recipe, call) {
   } else {
     regression_of(steps, recipe$formula, recipe$model, call)
   }
-  update <- if (recipe$double) double_update else best_update
   prepared <- prepare_steps(steps, regression, recipe$stages)
-  if (recipe$table) prepared <- equal_steps_together(prepared, recipe$double)
   prepared <- weigh_steps(prepared, rep(1, length(steps$step)))
+  sweep <- if (recipe$table && !recipe$double) table_sweep(prepared, regression, recipe$discount)
   fits <- iterate_fits(
-    function(fit, step) update(prepared, regression, fit, step, recipe$discount),
-    recipe$horizon, recipe$iterations,
-    function(fit) best_next_values(regression, fit, prepared$after)
+    function(fit, step, ahead) {
+      if (recipe$double) {
+        double_update(prepared, regression, fit, step, recipe$discount)
+      } else if (is.null(sweep) || is.null(ahead)) {
+        fit_targets(prepared, regression, ahead, step, recipe$discount)
+      } else {
+        sweep(fit)
+      }
+    },
+    function(fit, step) best_next_values(regression, fit, prepared$after),
+    recipe$horizon, recipe$iterations
   )
   new_rule(regression, fits, steps, recipe)
 }
@@ -145,10 +152,8 @@ prepare_steps <- function(steps, regression, stages) {
 }
 
 # Steps of a table that start and end in the same way become one. `group` tells which.
-equal_steps_together <- function(prepared, double = FALSE) {
-  each <- c("here", "action", "after", "ends", "known", if (prepared$stages) "step",
-            if (double) "episode")
-  if (double) prepared$episode <- prepared$episode %% 2L
+equal_steps_together <- function(prepared) {
+  each <- c("here", "action", "after", "ends", "known", if (prepared$stages) "step")
   key <- do.call(paste, prepared[each])
   prepared$group <- match(key, unique(key))
   prepared$each_reward <- prepared$reward
@@ -161,7 +166,7 @@ equal_steps_together <- function(prepared, double = FALSE) {
 weigh_steps <- function(prepared, weight) {
   prepared$weight <- weight
   if (!is.null(prepared$group)) {
-    sums <- rowsum(cbind(weight, weight * prepared$each_reward), prepared$group)
+    sums <- rowsum(cbind(weight, weight * prepared$each_reward), prepared$group, reorder = FALSE)
     prepared$weight <- sums[, 1L]
     prepared$reward <- sums[, 2L] / sums[, 1L]
   }
@@ -169,24 +174,29 @@ weigh_steps <- function(prepared, weight) {
 }
 
 #' Fit values until they do not change any more, or backwards
-#' @param update A function of the fit of the next step (`NULL` at first) and the number of a step
-#'   (`NA` without a horizon) that returns another fit.
-#' @param values_of A function of a fit that returns the values by which a change is noticed.
+#' @param update A function of the fit of the next step (`NULL` at first), the number of a step
+#'   (`NA` without a horizon) and the values ahead of each step (`NULL` at first) that returns
+#'   another fit.
+#' @param values_of A function of a fit and a step that returns the values ahead.
+#' @param start A fit to start from, or `NULL`. It saves iterations.
 #' @return A list of fits: one for each step of a horizon, or a single one.
 #' @noRd
-iterate_fits <- function(update, horizon, iterations, values_of) {
+iterate_fits <- function(update, values_of, horizon, iterations, start = NULL) {
   fit <- NULL
   if (!is.null(horizon)) {
     fits <- vector("list", horizon)
-    for (step in rev(seq_len(horizon))) fits[[step]] <- fit <- update(fit, step)
+    for (step in rev(seq_len(horizon))) {
+      fits[[step]] <- fit <- update(fit, step, if (!is.null(fit)) values_of(fit, step))
+    }
     return(fits)
   }
-  before <- Inf
+  fit <- start
+  ahead <- if (!is.null(fit)) values_of(fit, NA)
   for (iteration in seq_len(iterations)) {
-    fit <- update(fit, NA)
-    values <- values_of(fit)
-    if (all(abs(values - before) <= 1e-12 * pmax(1, abs(values)))) break
-    before <- values
+    before <- ahead %||% Inf
+    fit <- update(fit, NA, ahead)
+    ahead <- values_of(fit, NA)
+    if (all(abs(ahead - before) <= 1e-12 * pmax(1, abs(ahead)))) break
   }
   list(fit)
 }
@@ -208,9 +218,26 @@ fit_targets <- function(prepared, regression, ahead, step, discount, used = TRUE
   regression$fit(prepared$here, prepared$action, target, weight)
 }
 
-best_update <- function(prepared, regression, fit, step, discount) {
-  ahead <- if (!is.null(fit)) best_next_values(regression, fit, prepared$after)
-  fit_targets(prepared, regression, ahead, step, discount)
+# The same for all pairs of a table at once: their mean rewards, and where their steps lead.
+table_sweep <- function(prepared, regression, discount) {
+  used <- which(prepared$ends | prepared$known)
+  states <- nrow(regression$states)
+  cell <- (prepared$here + states * (prepared$action - 1L))[used]
+  own <- unique(cell)
+  from <- match(cell, own)
+  share <- 1 / tabulate(from)[from]
+  reward <- rowsum(share * prepared$reward[used], from, reorder = FALSE)[, 1L]
+  goes_on <- !prepared$ends[used]
+  moves <- Matrix::sparseMatrix(
+    i = from[goes_on], j = prepared$after[used][goes_on], x = discount * share[goes_on],
+    dims = c(length(own), states)
+  )
+  function(fit) {
+    values <- reward + times(moves, best_next_values(regression, fit, seq_len(states)))
+    fit[] <- NA
+    fit[own] <- values
+    fit
+  }
 }
 
 # A fit is then two, one of each half of the episodes.
@@ -235,7 +262,14 @@ known_values <- function(q) {
 
 # The value of the best action that was taken in each state; 0 where none was.
 best_next_values <- function(regression, fit, block) {
-  best_values(known_values(fit_values(regression, fit, block)))
+  if (is.null(regression$states)) {
+    return(best_values(known_values(fit_values(regression, fit, block))))
+  }
+  # A table has fewer states than there are steps.
+  best <- best_values(known_values(fit_values(regression, fit, seq_len(nrow(regression$states)))))
+  found <- best[block]
+  found[is.na(block)] <- 0
+  found
 }
 
 fit_values <- function(regression, fit, block) {

@@ -21,18 +21,10 @@ policy_fits <- function(design, prepared, next_at, start = NULL) {
   }
   # Go backwards from the last step. The number of the step matters only with `stages` or a policy
   # that counts steps.
-  ahead_of <- function(fit, step) {
-    if (!is.null(fit)) {
-      policy_mean(regression$values(fit, prepared$after), next_at(step + 1))
-    }
-  }
   iterate_fits(
-    function(fit, step) {
-      # Without a horizon the fit to start from, if there is one, saves iterations.
-      fit <- if (is.na(step)) fit %||% start else fit
-      fit_targets(prepared, regression, ahead_of(fit, step), step, discount)
-    },
-    design$horizon, most_evaluations, function(fit) ahead_of(fit, NA)
+    function(fit, step, ahead) fit_targets(prepared, regression, ahead, step, discount),
+    function(fit, step) policy_mean(regression$values(fit, prepared$after), next_at(step + 1)),
+    design$horizon, most_evaluations, start
   )
 }
 

@@ -81,7 +81,7 @@ table_regression <- function(steps) {
     states = states, block = function(states) match(row_keys(states), keys),
     fit = function(block, action, target, weight) {
       cell <- block + nrow(states) * (action - 1L)
-      sums <- rowsum(cbind(weight, weight * target), cell)
+      sums <- rowsum(cbind(weight, weight * target), cell, reorder = FALSE)
       fit <- matrix(NA_real_, nrow(states), many)
       used <- sums[, 1L] > 0
       fit[as.integer(rownames(sums))[used]] <- sums[used, 2L] / sums[used, 1L]
@@ -91,15 +91,16 @@ table_regression <- function(steps) {
     fixed = function(here, after, action, reward, go_on, p_next, weight, call) {
       used <- weight > 0
       cell <- (here + nrow(states) * (action - 1L))[used]
-      own <- sort(unique(cell))
+      own <- unique(cell)
       from <- match(cell, own)
-      sums <- rowsum(cbind(weight, weight * reward)[used, , drop = FALSE], from)
+      sums <- rowsum(cbind(weight, weight * reward)[used, , drop = FALSE], from, reorder = FALSE)
       share <- (weight * go_on * p_next)[used, , drop = FALSE] / sums[from, 1L]
       to <- match(outer(after[used], nrow(states) * (seq_len(many) - 1L), `+`), own)
       some <- which(!is.na(to) & share > 0)
       moves <- flow_matrix(rep(from, many)[some], to[some], share[some], length(own))
+      ending <- from[go_on[used] < 1 | rowSums(is.na(to) & share > 0) > 0]
       fit <- matrix(NA_real_, nrow(states), many)
-      fit[own] <- solve_values(moves, sums[, 2L] / sums[, 1L], call)
+      fit[own] <- chain_values(moves, sums[, 2L] / sums[, 1L], ending, call)
       fit
     }
   )
@@ -108,15 +109,18 @@ table_regression <- function(steps) {
 # Texts that are the same for the same state.
 row_keys <- function(states) row_texts(states, sep = "\r")
 
-solve_values <- function(moves, reward, call) {
-  identity <- if (is.matrix(moves)) diag(nrow(moves)) else Matrix::Diagonal(nrow(moves))
-  tryCatch(as.vector(Matrix::solve(identity - moves, reward)), error = function(cnd) {
+# The values of states that lead to each other like this; episodes may end in `ending`.
+chain_values <- function(moves, reward, ending, call) {
+  leads <- function(reached) times(moves, reached) > 0
+  if (!all(closure(leads, seq_along(reward) %in% ending))) {
     gym_abort(
       c("The policy's values are infinite: in the data some of its episodes never end.",
         i = "Give a `discount` below 1, or a `horizon`."),
       class = "gym_error_argument", argument = "discount", call = call
     )
-  })
+  }
+  worth <- chain_solver(moves, call)
+  worth(pmax(reward, 0)) - worth(pmax(-reward, 0))
 }
 
 # A linear model ------------------------------------------------------------------------
@@ -202,7 +206,9 @@ linear_regression <- function(formula, steps, call) {
 
 any_regression <- function(formula, model, steps) {
   labels <- as.character(steps$actions)
-  with_action <- function(states, action) {
+  # Rows of a data frame that are selected twice would get names, which takes long.
+  with_action <- function(states, rows, action) {
+    states <- list2DF(lapply(states, function(x) x[rows]))
     states$action <- factor(labels[action], labels)
     states
   }
@@ -210,20 +216,19 @@ any_regression <- function(formula, model, steps) {
     label = paste("a model,", deparse1(formula[-2L])),
     block = function(states) list(states = states, known = stats::complete.cases(states)),
     fit = function(block, action, target, weight) {
-      data <- with_action(block$states, action)
-      data$value <- target
       # A weight is how often a row was drawn.
-      data <- data[rep(seq_along(target), round(weight)), , drop = FALSE]
+      rows <- rep(seq_along(target), round(weight))
+      data <- with_action(block$states, rows, action[rows])
+      data$value <- target[rows]
       tryCatch(model(formula, data = data), error = function(cnd) abort_regression(cnd, NULL))
     },
     values = function(fit, block) {
-      n <- nrow(block$states)
-      some <- block$states[block$known, , drop = FALSE]
-      each <- rep(seq_along(labels), each = nrow(some))
-      values <- matrix(0, n, length(labels))
-      if (nrow(some)) {
-        asked <- with_action(some[rep(seq_len(nrow(some)), length(labels)), , drop = FALSE], each)
-        values[block$known, ] <- model_values(fit, asked)
+      some <- which(block$known)
+      values <- matrix(0, length(block$known), length(labels))
+      if (length(some)) {
+        each <- rep(seq_along(labels), each = length(some))
+        asked <- with_action(block$states, rep(some, length(labels)), each)
+        values[some, ] <- model_values(fit, asked)
       }
       values
     }

@@ -7,7 +7,8 @@
 #'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`. The columns
 #'   `episode` and `step` tell which rows are the first of an episode, where episodes start. Without
 #'   `step` the rows of each episode must be in order. Without both, an episode goes on in the next
-#'   row until it is terminated.
+#'   row until it is terminated. Observations of several parts that can be counted, such as those of
+#'   a MultiDiscrete space, become states with the names of their columns.
 #'   Or the result of [steps_data()], whose states and actions keep their names. A step that ends an
 #'   episode without a known next state then leads back to its own state.
 #' @param ... For methods.
@@ -15,8 +16,8 @@
 #'   rollout's policy knows them, and otherwise those from the lowest to the highest number in the
 #'   steps. A state that was reached but never left, because episodes were cut off there, counts as
 #'   terminal; a message says so.
-#' @section Errors: `gym_error_argument` for a rollout without steps, observations that are not
-#'   Discrete, or rows that are not in order.
+#' @section Errors: `gym_error_argument` for a rollout without steps, observations that cannot be
+#'   counted, or rows that are not in order.
 #' @seealso [env_model()], which gets the model from the environment
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -38,7 +39,10 @@ estimate_model.gym_rollout <- function(x, ...) {
   steps <- x$steps
   # The spaces of the environment, if the policy has them; a function does not.
   spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
-  if (is.data.frame(steps)) steps <- steps_by_number(steps, spaces, rlang::current_env())
+  if (is.data.frame(steps)) {
+    spaces <- counted_states(spaces, steps)
+    steps <- steps_by_number(steps, spaces, rlang::current_env())
+  }
   after <- grep("^next_", names(steps), value = TRUE)
   if (!is.data.frame(steps) || !length(after)) {
     gym_abort(
@@ -89,6 +93,18 @@ estimate_model.data.frame <- function(x, ...) {
     table, states, actions, stats::setNames(starts / sum(starts), value_labels(states)),
     list(id = "estimated model", reward_threshold = NULL, max_episode_steps = NULL), call
   )
+}
+
+# Observations of several parts that can be counted, such as those of a MultiDiscrete space, become
+# states with the names of their columns.
+counted_states <- function(spaces, steps) {
+  space <- spaces$observation_space
+  after <- grep("^next_", names(steps), value = TRUE)
+  if (length(after) > 1L && is.null(space$values) && !is.null(space_index(space))) {
+    values <- all_values(space)
+    spaces$observation_space <- labelled_space(stats::setNames(values, sub("^next_", "", after)))
+  }
+  spaces
 }
 
 # Named states and actions as their numbers.

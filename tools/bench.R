@@ -8,7 +8,7 @@
 #   make bench QUICK=1      a glance: the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
-#   [beside] [wire] [memory] [tables] runs parts.
+#   [beside] [wire] [memory] [tables] [data] runs parts.
 #
 #   make bench PARTS=stream      another build of this package against this one; see
 #                                tools/bench/stream.R on how to name it
@@ -20,7 +20,8 @@
 
 library(gym)
 for (file in c("turns", "workers", "cpu", "classic", "contenders", "r-env", "search", "tasks",
-               "rollouts", "beside", "wire", "stream", "gradients", "tables", "results", "goals",
+               "rollouts", "beside", "wire", "stream", "gradients", "tables", "data", "results",
+               "goals",
                "table", "figure", "figure-environments")) {
   source(file.path("tools", "bench", paste0(file, ".R")))
 }
@@ -69,13 +70,14 @@ bench <- function(parts, quick) {
       compare_gradients(python, utils::modifyList(scale, gradient_scale))
     },
     if ("tables" %in% parts) compare_tables(python, scale$rollout_turns, scale$fresh),
+    if ("data" %in% parts) compare_data(python, scale$rollout_turns),
     if ("memory" %in% parts) measure_memory(scale$steps)
   )
   list(rows = rows, run = c(describe_run(setup, parts), took = paste(round(now() - started), "s")))
 }
 
 set_up <- function(python, parts) {
-  if (all(parts %in% c("gradients", "tables", "stream"))) {
+  if (all(parts %in% c("gradients", "tables", "data", "stream"))) {
     return(list(python = start_python(python)))
   }
   numpy_1 <- Filter(dir.exists, file.path(dirname(dirname(python)), "numpy-1"))
@@ -145,7 +147,7 @@ report <- function(result, csv, text, figure, environments) {
 arguments <- commandArgs(trailingOnly = TRUE)
 quick <- "quick" %in% arguments
 all_parts <- c("single", "vector", "r_env", "search", "env_rollouts", "beside", "wire",
-               "memory", "tables")
+               "memory", "tables", "data")
 parts <- intersect(c(all_parts, "stream", "gradients"), arguments)
 whole <- !quick && !length(parts)
 if (!length(parts)) parts <- all_parts

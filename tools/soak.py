@@ -109,7 +109,7 @@ def parts(quick: bool, seconds: float | None) -> dict[str, Part]:
         "hosts": testthat("hosts", GYM_TEST_ALL="true", GYM_TEST_HOSTS="all"),
         "book": testthat("book-articles", GYM_TEST_BOOK="all"),
         "tables": testthat("learn-table", GYM_TEST_TABLES="all"),
-        "coverage": r("coverage", 50 if quick else 2000),
+        "coverage": r("coverage", 2000, lasting(7200, 60)),
         "soak": python("soak", lasting(1800, 60)),
     }
 

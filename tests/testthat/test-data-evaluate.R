@@ -137,6 +137,17 @@ test_that("t intervals are those of a mean", {
                ignore_attr = TRUE)
 })
 
+test_that("bootstrap intervals of few episodes are as long as those by t", {
+  set.seed(1)
+  few <- data.frame(episode = 1:12, s = "a", action = rep(0:1, 6), reward = stats::rnorm(12))
+  by <- function(interval) {
+    found <- evaluate_offline(few, policy_random(), "is", behavior = policy_random(), seed = 1,
+                              interval = interval, replicates = 4000)$estimates
+    found$upper - found$lower
+  }
+  expect_equal(by("bootstrap"), by("t"), tolerance = 0.05)
+})
+
 test_that("a seed fixes folds and replicates and leaves the session's generator", {
   steps <- logged(50)
   set.seed(1)
@@ -227,4 +238,41 @@ test_that("fitted Q evaluation is that of a loop in NumPy", {
   }
   expect_equal(by(NULL), reference$value, tolerance = 1e-6)
   expect_equal(by(3), reference$value_in_3_steps, tolerance = 1e-6)
+})
+
+test_that("fitted Q evaluation of a large table is the value in the model of the steps", {
+  skip_unless_all()
+  set.seed(1)
+  visits <- data.frame(
+    episode = rep(1:400, each = 10), state = sample(0:79, 4000, TRUE), action = 0:1,
+    reward = stats::rnorm(4000)
+  )
+  steps <- steps_data(visits)
+  policy <- cbind(seq_len(80), 80:1) / 81
+  found <- evaluate_offline(steps, by_table(policy), "fqe", seed = 1, replicates = 2)
+  exact <- solve_mdp(estimate_model(steps), policy, discount = 1)$start_value
+  expect_equal(found$estimates$estimate, exact, tolerance = 1e-10)
+})
+
+test_that("values that are infinite are an error", {
+  # The policy goes round in circles; the data also has an end.
+  round <- data.frame(
+    episode = rep(1:10, each = 3), s = c("a", "b", "a"), action = c("on", "on", "stop"), reward = 1
+  )
+  expect_error(
+    suppressWarnings(evaluate_offline(steps_data(round), "on", "fqe", replicates = 2)),
+    "infinite: in the data some of its episodes never end"
+  )
+})
+
+test_that("a level that few episodes have is an error that says so", {
+  set.seed(1)
+  visits <- data.frame(
+    episode = 1:40, s = c("rare", rep(c("a", "b"), c(20, 19))), action = c("x", "y"), reward = 1
+  )
+  expect_error(
+    evaluate_offline(visits, "x", "dr", behavior = policy_random(), seed = 1,
+                     model = function(formula, data) lm(formula, data)),
+    "cannot be fitted, or does not predict.*A level is only in few episodes"
+  )
 })

@@ -117,3 +117,22 @@ test_that("a rule prints what it does", {
   expect_snapshot(print(learn_q(data[-2])))
   expect_error(predict(learn_q(data[-2]), data.frame(s = "mid")), "The rule knows no s \"mid\"")
 })
+
+test_that("the frozen lake is solved from random play", {
+  skip_unless_all()
+  played <- rollout("FrozenLake-v1", policy_random(), episodes = 2000, seed = 1, steps = TRUE,
+                    client = test_client())
+  table <- learn_q(played, discount = 0.95)
+  q <- state_values(table, actions = TRUE)
+  solved <- solve_mdp(estimate_model(steps_data(played)), discount = 0.95)
+  expect_equal(q$value, as.vector(t(solved$q[as.character(unique(q$position)), ])),
+               tolerance = 1e-8)
+  # A linear model with a coefficient for each state is the same table.
+  linear <- learn_fitted_q(played, ~ action * factor(position), discount = 0.95, iterations = 1000)
+  expect_equal(state_values(linear, actions = TRUE)$value, q$value, tolerance = 1e-6)
+  # It does as well in the lake as the best policy.
+  lake <- env_model("FrozenLake-v1", client = test_client())
+  learned <- predict(table, data.frame(position = 0:15))
+  worth <- solve_mdp(lake, learned, discount = 0.95)$start_value
+  expect_gt(worth, 0.9 * solve_mdp(lake, discount = 0.95)$start_value)
+})

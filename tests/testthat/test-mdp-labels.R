@@ -80,3 +80,35 @@ test_that("pictures have the names of states", {
   grid <- ggplot2::ggplot_build(ggplot2::autoplot(solve_mdp(named_grid())))
   expect_equal(grid$layout$panel_params[[1]]$x$get_labels(), c("1", "2", "3"))
 })
+
+test_that("observations of several parts are states of an estimated model, and its policy plays", {
+  # Row and column; the end is in the corner.
+  walk <- function(space, observe) {
+    gym_env(
+      reset = function(self) {
+        self$at <- c(0L, 0L)
+        observe(self$at)
+      },
+      step = function(self, action) {
+        self$at[[action + 1L]] <- min(self$at[[action + 1L]] + 1L, 1L)
+        list(observation = observe(self$at), reward = -1, terminated = all(self$at == 1L))
+      },
+      observation_space = space, action_space = space_discrete(2), max_episode_steps = 20
+    )
+  }
+  both <- list(space_discrete(2), space_discrete(2))
+  envs <- list(
+    walk(space_dict(row = both[[1L]], column = both[[2L]]),
+         function(at) list(row = at[[1L]], column = at[[2L]])),
+    walk(do.call(space_tuple, both), as.list),
+    # One state of six is never seen.
+    walk(space_multi_discrete(c(2, 3)), identity)
+  )
+  for (env in envs) {
+    played <- rollout(env, policy_random(), episodes = 30, seed = 1, steps = TRUE,
+                      next_observation = TRUE)
+    solved <- solve_mdp(suppressMessages(estimate_model(played)))
+    expect_equal(solved$start_value, -2)
+    expect_equal(rollout(env, solved$policy, episodes = 1)$episodes$return, -2)
+  }
+})

@@ -28,6 +28,7 @@ check_goals <- function(rows) {
     if ("stream" %in% parts) stream_goals(rows),
     if ("gradients" %in% parts) gradient_goals(rows),
     if ("tables" %in% parts) table_goals(rows),
+    if ("data" %in% parts) data_goals(rows),
     if ("memory" %in% parts) memory_goals(rows)
   )))
 }

@@ -42,7 +42,8 @@ ratios <- function(gym, other, unit) {
 own <- c(
   single = "gym, env$step()", vector = "gym, env$step()", search = "gym, search_random()",
   env_rollouts = "gym, rollout()", candidates = "gym, rollout()", wire = "gym, env$step()",
-  gradients = "gym, learn_ppo()", tables = "gym, learn_q()", stream = "gym, this build"
+  gradients = "gym, learn_ppo()", tables = "gym, learn_q()", data = "gym, learn_q(data)",
+  stream = "gym, this build"
 )
 
 # One row for each contender and number of sub-environments.

@@ -14,7 +14,8 @@ what_text <- function(summary) {
     summary$num_envs > 0, sprintf("%.0f sub-environment%s", summary$num_envs, plural),
     words[summary$part]
   )
-  ifelse(summary$part %in% c("env_rollouts", "gradients", "tables", "stream"), summary$env_id, text)
+  by_id <- c("env_rollouts", "gradients", "tables", "data", "stream")
+  ifelse(summary$part %in% by_id, summary$env_id, text)
 }
 
 # The parts of a run, each group a table of its own.
@@ -24,6 +25,7 @@ table_groups <- list(
   step = "wire",
   gradients = "gradients",
   tables = "tables",
+  data = "data",
   stream = "stream"
 )
 

@@ -1,16 +1,16 @@
 # How often intervals of evaluate_offline() cover the exact value, and how far estimates are off.
 #
-#   Rscript tools/soak/coverage.R DATASETS [REPLICATES [FOLDER]]
+#   Rscript tools/soak/coverage.R [DATASETS [SECONDS]]
 #
-# Data sets of 200 episodes are drawn from a model whose values solve_mdp() knows. A row of the
-# table is a method in a setting. `expected` marks rows whose theory says that the interval covers:
-# it fails if one of these lies outside of the interval in which the shares of all of them would lie
-# in 99 of 100 studies. FOLDER gets coverage.csv, the table.
+# Data sets of 200 episodes are drawn from a model whose values solve_mdp() knows, as many as asked
+# for, or as fit into the time. It prints the table of vignettes/which-treatment.Rmd. A * marks rows
+# of which theory says that the interval covers: it fails if one of these lies outside of the
+# interval in which the shares of all of them would lie in 99 of 100 studies.
 
 library(gym)
-arguments <- commandArgs(TRUE)
-sets <- as.integer(c(arguments, "2000")[[1L]])
-replicates <- if (length(arguments) > 1L) as.integer(arguments[[2L]]) else 400L
+arguments <- as.numeric(commandArgs(TRUE))
+asked <- c(arguments, 2000)[[1L]]
+until <- Sys.time() + c(arguments[-1L], 7200)[[1L]]
 episodes <- 200L
 discount <- 0.9
 
@@ -19,69 +19,82 @@ model <- small_model()
 
 # One rollout plays the episodes of all data sets.
 played <- rollout(
-  model, policy_table(log(behaves), temperature = 1), episodes = sets * episodes, seed = 1,
+  model, policy_table(log(behaves), temperature = 1), episodes = asked * episodes, seed = 1,
   steps = TRUE
 )$steps
-set <- (played$episode - 1L) %/% episodes + 1L
-data <- lapply(split(played, set), steps_data)
+data <- split(played, (played$episode - 1L) %/% episodes)
 
-all <- c("fqe", "is", "wis", "pdis", "dr", "wdr")
+weighted <- c("is", "wis", "pdis", "dr", "wdr")
+wrong <- "5 steps, wrong regression"
+# A fit in each replicate is slow, so there are fewer of them.
 settings <- list(
-  `to the end` = list(expected = c("fqe", "dr", "wdr")),
-  `5 steps` = list(horizon = 5, expected = c("fqe", "dr", "wdr")),
-  `5 steps, wrong regression` = list(
-    horizon = 5, formula = ~ action, expected = c("dr", "wdr")
-  ),
-  `5 steps, estimated behavior` = list(
-    horizon = 5, behavior = NULL, expected = c("dr", "wdr"), method = c("is", "wis", "dr", "wdr"),
-    replicates = min(replicates, 200L)
-  ),
-  `5 steps, t` = list(
-    horizon = 5, interval = "t", method = c("is", "pdis", "dr"), expected = "dr"
-  )
+  list("to the end", method = "fqe", replicates = 200, expected = "fqe"),
+  list("to the end", method = weighted, expected = c("dr", "wdr")),
+  list("5 steps", method = "fqe", horizon = 5, replicates = 200, expected = "fqe"),
+  list("5 steps", method = weighted, horizon = 5, expected = c("dr", "wdr")),
+  list(wrong, method = "fqe", horizon = 5, formula = ~ action, replicates = 50),
+  list(wrong, method = c("dr", "wdr"), horizon = 5, formula = ~ action,
+       expected = c("dr", "wdr")),
+  list("5 steps, estimated behavior", method = c("is", "wis", "dr", "wdr"), horizon = 5,
+       behavior = NULL, replicates = 100, expected = c("dr", "wdr")),
+  list("5 steps, t", method = c("is", "pdis", "dr"), horizon = 5, interval = "t", expected = "dr")
 )
 
-study <- function(name) {
-  setting <- settings[[name]]
-  exact <- solve_mdp(model, wanted, discount = discount, horizon = setting$horizon)$start_value
+exact_values <- vapply(settings, function(setting) {
+  solve_mdp(model, wanted, discount = discount, horizon = setting$horizon)$start_value
+}, 0)
+
+estimate <- function(setting, exact, steps, seed) {
   given <- utils::modifyList(
-    list(behavior = by_table(behaves), method = all, replicates = replicates),
-    setting[setdiff(names(setting), "expected")], keep.null = TRUE
+    list(behavior = by_table(behaves), replicates = 400),
+    setting[setdiff(names(setting), c("", "expected"))], keep.null = TRUE
   )
-  found <- lapply(seq_along(data), function(i) {
-    suppressWarnings(do.call(evaluate_offline, c(
-      list(data[[i]], by_table(wanted), discount = discount, seed = i), given
-    )))$estimates
-  })
-  found <- do.call(rbind, found)
-  rows <- lapply(split(found, factor(found$method, all)), function(x) {
-    if (!nrow(x)) return(NULL)
-    data.frame(
-      setting = name, method = x$method[[1L]], exact = exact, bias = mean(x$estimate) - exact,
-      bias_se = stats::sd(x$estimate) / sqrt(sets), sd = stats::sd(x$estimate),
-      mean_se = mean(x$se), covered = mean(x$lower <= exact & exact <= x$upper),
-      expected = x$method[[1L]] %in% setting$expected
-    )
-  })
-  do.call(rbind, rows)
+  found <- suppressWarnings(do.call(evaluate_offline, c(
+    list(steps, by_table(wanted), discount = discount, seed = seed), given
+  )))$estimates
+  data.frame(setting = setting[[1L]], found, exact = exact,
+             expected = found$method %in% setting$expected)
 }
 
-table <- do.call(rbind, lapply(names(settings), study))
-cells <- sum(table$expected)
-# For all these rows together.
-ends <- stats::qbinom(c(0.005 / cells, 1 - 0.005 / cells), sets, 0.95) / sets
-table$inside <- table$covered >= ends[[1L]] & table$covered <= ends[[2L]]
-row.names(table) <- NULL
-print(data.frame(
-  lapply(table, function(x) if (is.numeric(x)) signif(x, 3L) else x), check.names = FALSE
-), row.names = FALSE)
-if (length(arguments) > 2L) {
-  utils::write.csv(table, file.path(arguments[[3L]], "coverage.csv"), row.names = FALSE)
+found <- list()
+for (set in seq_along(data)) {
+  if (Sys.time() > until) break
+  steps <- steps_data(data[[set]])
+  found[[set]] <- do.call(rbind, Map(estimate, settings, exact_values, list(steps), set))
 }
-outside <- table[table$expected & !table$inside, ]
-cat(sprintf(
-  "coverage: %d data sets, %d of %d rows between %.3f and %.3f%s\n", sets,
-  cells - nrow(outside), cells, ends[[1L]], ends[[2L]],
-  if (nrow(outside)) paste0("; not ", toString(paste(outside$setting, outside$method))) else ""
-))
+sets <- length(found)
+found <- do.call(rbind, found)
+
+rows <- lapply(split(found, ~ method + setting, drop = TRUE), function(x) {
+  data.frame(
+    x[1L, c("setting", "method", "exact", "expected")], bias = mean(x$estimate - x$exact),
+    sd = stats::sd(x$estimate), se = mean(x$se),
+    below = mean(x$upper < x$exact), above = mean(x$lower > x$exact)
+  )
+})
+table <- do.call(rbind, rows)
+table <- table[order(match(table$setting, found$setting), match(table$method, found$method)), ]
+table$covered <- 1 - table$below - table$above
+# For all these rows together.
+cells <- sum(table$expected)
+ends <- stats::qbinom(c(0.005 / cells, 1 - 0.005 / cells), sets, 0.95) / sets
+outside <- table[table$expected & (table$covered < ends[[1L]] | table$covered > ends[[2L]]), ]
+
+fixed <- function(x, digits) formatC(x, format = "f", digits = digits)
+cat(
+  "| setting | method | exact | bias | sd | mean `se` | below | above | covered |",
+  "|:---|:---|---:|---:|---:|---:|---:|---:|---:|",
+  with(table, paste(
+    "|", setting, "|", paste0(method, ifelse(expected, "*", "")), "|", fixed(exact, 3), "|",
+    fixed(bias, 3), "±", fixed(sd / sqrt(sets), 3), "|", fixed(sd, 3), "|", fixed(se, 3), "|",
+    fixed(below, 3), "|", fixed(above, 3), "|", fixed(covered, 3), "±",
+    fixed(sqrt(covered * (1 - covered) / sets), 3), "|"
+  )),
+  sprintf(
+    "coverage: %d data sets, %d of %d rows between %.3f and %.3f%s", sets, cells - nrow(outside),
+    cells, ends[[1L]], ends[[2L]],
+    if (nrow(outside)) paste0("; not ", toString(paste(outside$setting, outside$method))) else ""
+  ),
+  sep = "\n"
+)
 quit(status = as.integer(nrow(outside) > 0L))
