@@ -87,10 +87,13 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
                                  every = NULL, client = gym_client()) {
   check_dots_empty(...)
   # Not exec(), which would start a server for an environment that needs none.
-  rlang::inject(animate_episode(
-    file, fps, width, every, x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client,
-    !!!x$kwargs, call = rlang::current_env()
-  ))
+  animate_episode(
+    rlang::inject(rollout(
+      x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
+      !!!x$kwargs
+    )),
+    file, fps, width, every
+  )
 }
 
 #' @rdname animate
@@ -99,7 +102,8 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
                                width = NULL, every = NULL, client = gym_client()) {
   check_dots_empty(...)
   animate_episode(
-    file, fps, width, every, env, x, max_steps = max_steps, seed = seed, client = client
+    rollout(env, x, max_steps = max_steps, seed = seed, client = client, frames = TRUE),
+    file, fps, width, every
   )
 }
 
@@ -160,10 +164,11 @@ episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_e
   x$frames[[row]]
 }
 
-# Plays an episode and makes an animation of it; `...` are arguments of rollout().
-animate_episode <- function(file, fps, width, every, ..., call = rlang::caller_env()) {
+# Makes an animation of the rollout that `code` plays. Its arguments stay there: one of an
+# environment's own may be `width`.
+animate_episode <- function(code, file, fps, width, every, call = rlang::caller_env()) {
   file <- check_animation(file, fps, width, every, call)
-  played <- naming_own_call(rollout(..., frames = TRUE), "rollout", call)
+  played <- naming_own_call(code, "rollout", call)
   new_animation(episode_frames(played), file, fps, width, every, call)
 }
 

@@ -130,6 +130,23 @@ test_that("a training plays its policy in its environment, with the arguments of
   expect_identical(animation$stills, pick_stills(fresh$frames[[1]], 8))
 })
 
+test_that("an argument of a training's environment may have the name of one of animate()", {
+  skip_if_not_installed("magick")
+  withr::defer(gym_unregister("Wide-v0"))
+  gym_register("Wide-v0", function(width = 8) {
+    gym_env(
+      reset = function(self) 0,
+      step = function(self, action) list(observation = 0, reward = 0, terminated = TRUE),
+      render = function(self) structure(array(255L, c(8, width, 3)), class = "gym_frame"),
+      observation_space = space_discrete(1), action_space = space_discrete(2)
+    )
+  })
+  trained <- train_agent(agent_random(), "Wide-v0", width = 16, total_steps = 1,
+                         eval_episodes = 2, seed = 1, progress = FALSE)
+  animation <- animate(trained, withr::local_tempfile(fileext = ".gif"))
+  expect_identical(animation$size, c(16L, 8L))
+})
+
 test_that("what cannot be animated says why, before anything is played", {
   skip_if_not_installed("magick")
   plain <- rollout("CartPole-v1", policy_random(), seed = 1, client = test_client())
