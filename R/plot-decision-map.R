@@ -161,10 +161,12 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
     ))
   }
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
-  if (!inherits(policy, "gym_policy_network") && !played) {
+  # The sizes of a network that was not played may be open.
+  sized <- inherits(policy, "gym_policy_network") && !anyNA(policy$sizes)
+  if (!sized && !played) {
     abort_wrong("env", env, call,
-                "Without `env` a decision map needs a network, or a model that was played, not
-                 {policy_text(policy)}.",
+                "Without `env` a decision map needs a network that knows its sizes, or a model that
+                 was played, not {policy_text(policy)}.",
                 i = "Give the environment, as in `decision_map(\"CartPole-v1\", policy, x = , y =
                      )`.")
   }

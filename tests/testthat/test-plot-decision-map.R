@@ -178,6 +178,7 @@ test_that("what cannot be mapped says why", {
   }
   bad(policy_random(), cartpole(), message = "a random policy ignores the observation")
   bad(function(observation) 1, message = "a decision map needs a network")
+  bad(policy_linear(), message = "a decision map needs a network that knows its sizes")
   bad("CartPole-v1", message = "`policy` must be a policy")
   one <- fake_environment(observation_space = box_space(-1, 1),
                           action_space = box_space(-1, 1))
