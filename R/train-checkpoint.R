@@ -70,7 +70,7 @@ training_checkpoint <- function(state, file, settings, call) {
     check_same(file$path, there, server, "is from a server with other settings", function(name) {
       paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
              describe_value(server[[name]]), " on this server.")
-    }, call)
+    }, call, are_arguments = FALSE)
     resume_training(state, file$saved, file$path, call)
     # With a larger budget the final evaluation comes later.
     state$final <- NULL
@@ -212,10 +212,11 @@ environment_traits <- function(env) {
 }
 
 # `line_of` is a function of a name, whose values differ.
-check_same <- function(path, there, here, problem, line_of, call) {
+check_same <- function(path, there, here, problem, line_of, call, are_arguments = TRUE) {
   differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
   if (length(differ)) {
-    abort_checkpoint(path, problem, vapply(differ, line_of, ""), call, argument = differ)
+    lines <- vapply(differ, line_of, "")
+    abort_checkpoint(path, problem, lines, call, argument = if (are_arguments) differ)
   }
 }
 
