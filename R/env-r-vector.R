@@ -45,7 +45,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
   new_vector_env(
     traits$observation_space, traits$action_space, traits$spec, num_envs = length(sub_envs),
     batch_size = batch_size, one_seed = FALSE, env = alone,
-    frame = if (frames) function() sub_env_png(sub_envs[[1L]]),
+    frame = if (frames) function() sub_env_png(sub_envs[[1L]], NULL),
     step_one = if (!is.null(alone)) single_stepper(sub_envs[[1L]]),
     guard = if (!is.null(alone)) single_guard(sub_envs[[1L]]),
     reset = function(seeds, which = all) {
@@ -241,7 +241,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   traits <- definition$traits
   new_vector_env(
     traits$observation_space, traits$action_space, traits$spec, num_envs = num_envs,
-    batch_size = num_envs, one_seed = TRUE, frame = if (frames) function() sub_env_png(sub_env),
+    batch_size = num_envs, one_seed = TRUE,
+    frame = if (frames) function() sub_env_png(sub_env, NULL),
     reset = function(seeds, which = NULL) {
       reset_sub_env(sub_env, seeds[[1L]], call = rlang::current_env())
     },

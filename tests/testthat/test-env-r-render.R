@@ -120,3 +120,15 @@ test_that("what cannot be drawn is refused with the fix", {
   env$reset()
   expect_error(env$render(), "raised an error", class = "gym_error_environment")
 })
+
+test_that("a frame that fails during play names the user's call", {
+  env <- gym_env(
+    reset = function(self) 0,
+    step = function(self, action) list(observation = 0, reward = 0, terminated = TRUE),
+    render = function(self) list(1), observation_space = space_discrete(1),
+    action_space = space_discrete(2)
+  )
+  failed <- expect_error(rollout(env, policy_random(), frames = TRUE), "drew nothing",
+                         class = "gym_error_argument")
+  expect_identical(failed$call[[1L]], quote(rollout))
+})
