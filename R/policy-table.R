@@ -88,7 +88,7 @@ states_of <- function(policy) policy$observation_space %||% space_discrete(nrow(
 
 #' @exportS3Method
 act_batch.gym_policy_table <- function(policy, observation, n, vector_env) {
-  rows <- table_rows(policy, observation, n)
+  rows <- table_rows(policy, observation, n, vector_env$call)
   start <- policy$action_space$start %||% 0L
   as.integer(draw_table_actions(policy, rows) - 1L + start)
 }

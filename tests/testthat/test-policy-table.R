@@ -117,3 +117,9 @@ test_that("a table whose names are numbers in another order is refused with the 
   expect_no_error(policy_table(q[c(1, 3, 2), ]))
   expect_no_error(policy_table(`colnames<-`(q[c(1, 3, 2), ], c("left", "right"))))
 })
+
+test_that("an observation without a row is no error of an inner function", {
+  failed <- expect_error(act(policy_table(q = matrix(0, 2, 2)), 5), "no row for the observation 5",
+                         class = "gym_error_argument")
+  expect_null(failed$call)
+})
