@@ -75,10 +75,10 @@
 #'   that the data never took in some states.
 #' @references T. Hesterberg (2015), What teachers should know about the bootstrap, The American
 #'   Statistician 69. N. Jiang, L. Li (2016), Doubly robust off-policy value evaluation for
-#'   reinforcement   learning, ICML. H. Le, C. Voloshin, Y. Yue (2019), Batch policy learning under
-#'   constraints,   ICML. D. Precup, R. Sutton, S. Singh (2000), Eligibility traces for off-policy
-#'   policy   evaluation, ICML. P. Thomas, E. Brunskill (2016), Data-efficient off-policy policy
-#'   evaluation   for reinforcement learning, ICML.
+#'   reinforcement learning, ICML. H. Le, C. Voloshin, Y. Yue (2019), Batch policy learning under
+#'   constraints, ICML. D. Precup, R. Sutton, S. Singh (2000), Eligibility traces for off-policy
+#'   policy evaluation, ICML. P. Thomas, E. Brunskill (2016), Data-efficient off-policy policy
+#'   evaluation for reinforcement learning, ICML.
 #' @export
 #' @examples
 #' set.seed(1)
