@@ -8,7 +8,9 @@
 Sys.setenv(PROCESSX_NOTIFY_OLD_SIGCHLD = "true")
 library(testthat)
 Sys.setenv(
-  NOT_CRAN = "true", TESTTHAT_PARALLEL = "TRUE", TESTTHAT_CPUS = Sys.getenv("GYM_TEST_CPUS", "3")
+  NOT_CRAN = "true", TESTTHAT_PARALLEL = "TRUE", TESTTHAT_CPUS = Sys.getenv("GYM_TEST_CPUS", "3"),
+  # The files share the cores already; PyTorch's threads would wait for each other.
+  OMP_NUM_THREADS = "1"
 )
 Sys.unsetenv("GYM_SERVER_URL")
 options(testthat.summary.max_reports = Inf)

@@ -2,8 +2,6 @@ test_that("a policy for pictures plays whole games in its own process, and is ke
   skip_unless_all()
   skip_if_not(has_sb3(), "Stable-Baselines3 is not installed")
   skip_if_not(isTRUE(env_registry(test_client(), "ALE/Pong-v5")$available[1]), "the extra atari")
-  # Threads of several processes would wait for each other.
-  withr::local_envvar(OMP_NUM_THREADS = "1")
   short <- list(max_num_frames_per_episode = 80)
   trained <- suppressMessages(learn_sb3(
     "PPO", "ALE/Pong-v5", 64, policy = "CnnPolicy", n_steps = 32, batch_size = 32, n_epochs = 1,

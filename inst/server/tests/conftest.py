@@ -7,6 +7,8 @@ import socket
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -289,3 +291,20 @@ def watch(app):
         return instance, drawn
 
     return watch
+
+
+@pytest.fixture(scope="module")
+def child():
+    """Return a function that calls another one in a process that may load PyTorch.
+
+    It is a process of its own, as it is for users: PyTorch may crash where other tests have loaded
+    libraries that draw. There is one for all tests of a file, because PyTorch takes seconds to
+    import. It computes in one thread, as several wait for each other on a busy machine.
+    """
+    with ProcessPoolExecutor(
+        1,
+        mp_context=get_context("spawn"),
+        initializer=os.putenv,
+        initargs=("OMP_NUM_THREADS", "1"),
+    ) as pool:
+        yield lambda *call, **kwargs: pool.submit(*call, **kwargs).result()
