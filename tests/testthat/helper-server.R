@@ -86,6 +86,8 @@ local_canned_server <- function(answers = list(), frame = parent.frame()) {
   file <- withr::local_tempfile(.local_envir = frame)
   writeLines(jsonlite::toJSON(answers, auto_unbox = TRUE), file)
   client <- create_GymClient(local_bad_server("canned", file, frame = frame), timeout = 10)
+  # Its port may be that of a server that an earlier test has started and stopped.
+  the_session$servers[[client$remote_base]] <- NULL
   client$file <- file
   client
 }
