@@ -1,0 +1,160 @@
+# What is learned from data as a policy: it acts, predicts and prints its rule.
+
+# The values of all actions in some states, a data frame.
+rule_values <- function(policy, states, step = NULL, call = rlang::caller_env()) {
+  check_columns(states, policy$states, "newdata", call)
+  states <- as.data.frame(states)[policy$states]
+  for (name in names(states)) {
+    levels <- levels(policy$seen[[name]])
+    if (!is.null(levels)) {
+      new <- setdiff(as.character(states[[name]]), levels)
+      if (length(new)) {
+        gym_abort(
+          c(paste0("The rule knows no ", name, " ", describe_value(new[[1L]]), "."),
+            i = paste0("The data has ", few_names(levels), ".")),
+          class = "gym_error_argument", argument = "newdata", value = states, call = call
+        )
+      }
+      states[[name]] <- factor(states[[name]], levels)
+    }
+  }
+  block <- policy$regression$block(states)
+  if (length(policy$fits) == 1L) {
+    return(fit_values(policy$regression, policy$fits[[1L]], block))
+  }
+  values <- matrix(NA_real_, nrow(states), length(policy$actions))
+  step <- rep_len(step, nrow(states))
+  if (!all(step %in% seq_along(policy$fits))) {
+    must <- paste("a step from 1 to", length(policy$fits))
+    abort_argument(setdiff(step, seq_along(policy$fits))[1L], must, "newdata$step", call)
+  }
+  for (own in unique(step)) {
+    some <- fit_values(policy$regression, policy$fits[[own]], block)
+    values[step == own, ] <- some[step == own, ]
+  }
+  values
+}
+
+best_known <- function(policy, values) {
+  values <- known_values(values)
+  ifelse(rowSums(values > -Inf) > 0, max.col(values, "first"), policy$most_taken)
+}
+
+#' @exportS3Method
+predict_policy.gym_policy_fitted <- function(policy, newdata, type, call = rlang::caller_env()) {
+  if (!is.data.frame(newdata)) {
+    newdata <- data.frame(matrix(newdata, ncol = length(policy$states)))
+    names(newdata) <- policy$states
+  }
+  if (length(policy$fits) > 1L) check_columns(newdata, "step", "newdata", call)
+  values <- rule_values(policy, newdata, newdata[["step"]], call)
+  colnames(values) <- as.character(policy$actions)
+  best <- best_known(policy, values)
+  switch(
+    type, action = policy$actions[best], output = values,
+    probability = {
+      values[] <- 0
+      values[cbind(seq_along(best), best)] <- 1
+      values
+    }
+  )
+}
+
+#' @export
+act.gym_policy_fitted <- function(policy, observation, ...) {
+  predict_policy(policy, observation, "action")
+}
+
+# A rule with a horizon counts the steps in its memory. After the last one it goes on as in that.
+#' @exportS3Method
+act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
+  last <- length(policy$fits)
+  choose <- function(observation, step = NULL) {
+    columns <- data.frame(
+      observation_columns(vector_env$observation_space, observation), check.names = FALSE
+    )
+    if (!all(policy$states %in% names(columns)) && length(columns) == length(policy$states)) {
+      names(columns) <- policy$states
+    }
+    columns$step <- step
+    actions <- predict_policy(policy, columns, "action", vector_env$call)
+    encoded_values(vector_env$action_space, actions, "action", vector_env$call)
+  }
+  if (last == 1L) {
+    return(choose(observation))
+  }
+  policy$act <- function(observation, memory) {
+    list(action = choose(observation, memory[, "step"]), memory = pmin(memory + 1, last))
+  }
+  act_batch.gym_policy_memory(policy, observation, n, vector_env)
+}
+
+#' @export
+format.gym_policy_fitted <- function(x, ...) {
+  recipe <- x$recipe
+  if (is.null(recipe)) {
+    return(x$regression$label)
+  }
+  paste0(
+    "fitted Q", if (recipe$double) ", double", ", ", x$regression$label,
+    if (recipe$discount < 1) paste0(", discount ", number_text(recipe$discount)),
+    if (!is.null(recipe$horizon)) paste0(", horizon ", recipe$horizon)
+  )
+}
+
+#' @export
+print.gym_policy_fitted <- function(x, ...) {
+  cat("<policy: ", format(x), ">\n", sep = "")
+  shown <- length(x$fits) == 1L | x$step <= length(x$fits)
+  taken <- best_known(x, rule_values(x, x$seen[shown, , drop = FALSE], x$step[shown]))
+  share <- function(action) tabulate(action, length(x$actions)) / length(action)
+  print(data.frame(
+    action = as.character(x$actions), rule = percent_text_each(share(taken)),
+    data = percent_text_each(share(x$taken[shown]))
+  ), row.names = FALSE)
+  cat(rule_lines(x), sep = "\n")
+  invisible(x)
+}
+
+# With two actions a linear rule is one inequality; a small table is shown as it is.
+rule_lines <- function(x) {
+  regression <- x$regression
+  if (!is.null(regression$coefficients) && length(x$actions) == 2L && !x$recipe$double) {
+    return(unlist(lapply(seq_along(x$fits), function(step) {
+      own <- regression$coefficients(x$fits[[step]])
+      action <- paste0("action", x$actions[[2L]])
+      own <- own[grepl(action, names(own), fixed = TRUE)]
+      terms <- gsub(paste0(":?", action, ":?"), "", names(own))
+      terms <- ifelse(nzchar(terms), paste0(" x ", gsub("`", "", terms)), "")
+      sum <- paste0(ifelse(own < 0, " - ", " + "), number_text_each(abs(own)), terms, collapse = "")
+      paste0(
+        if (length(x$fits) > 1L) paste0("Step ", step, ": "), "Takes ", x$actions[[2L]], " if ",
+        sub("^ - ", "-", sub("^ [+] ", "", sum)), " > 0"
+      )
+    })))
+  }
+  if (!is.null(regression$states) && nrow(regression$states) <= 12L && length(x$fits) == 1L) {
+    best <- best_known(x, rule_values(x, regression$states))
+    return(paste0(row_texts(regression$states), ": ", x$actions[best]))
+  }
+  character()
+}
+
+# The values of the states of the data, for state_values().
+rule_state_values <- function(policy, actions) {
+  states <- policy$seen
+  if (length(policy$fits) > 1L) {
+    states <- data.frame(step = policy$step, states, check.names = FALSE)
+    states <- states[policy$step <= length(policy$fits), , drop = FALSE]
+  }
+  states <- sorted_rows(unique(states))
+  q <- rule_values(policy, states, states[["step"]])
+  if (!actions) {
+    return(data.frame(states, value = best_values(known_values(q)), check.names = FALSE))
+  }
+  row <- rep(seq_len(nrow(q)), each = ncol(q))
+  data.frame(
+    states[row, , drop = FALSE], action = rep(policy$actions, nrow(q)), value = as.vector(t(q)),
+    row.names = NULL, check.names = FALSE
+  )
+}
