@@ -124,15 +124,15 @@ class Player:
     # Predictions are within the bounds of a Box.
     clip = None
 
-    def __init__(self, model: BaseAlgorithm, env: gymnasium.Env, moments: Any = None) -> None:
+    def __init__(self, model: BaseAlgorithm, env: gymnasium.Env, normalize: Any = None) -> None:
         """Keep what acts.
 
         Args:
             model: the model.
             env: the environment, which has the masks of a MaskablePPO.
-            moments: a function that normalizes observations, or None.
+            normalize: a function that normalizes observations, or None.
         """
-        self.model, self.env, self.normalize = model, env, moments
+        self.model, self.env, self.normalize = model, env, normalize
         self.masked = type(model).__name__ == "MaskablePPO"
 
     def begin(self, seed: int) -> None:
