@@ -190,23 +190,19 @@ bandit_text <- function(rule, initial) {
 #' @export
 print.gym_bandit_learning <- function(x, ...) {
   if (!is.null(x$policy)) {
-    cat(
+    return(print_lines(x, c(
       paste0("A learner in logged data: ", x$label),
       paste0("It saw ", count_of(x$seen, "step"), " of ", whole_number_text(x$rows),
-             ": mean reward ", number_text(x$reward), se_text(x$se)),
-      sep = "\n"
-    )
-    return(invisible(x))
+             ": mean reward ", number_text(x$reward), se_text(x$se))
+    )))
   }
   last <- utils::tail(x$curve, 100L)
-  cat(
+  print_lines(x, c(
     paste0(count_of(x$learners, "learner"), " in ", x$env_id, ": ", x$label),
     paste0("Last ", count_of(nrow(last), "step"), " of ", number_text(nrow(x$curve)),
            ": mean reward ", number_text(mean(last$mean_reward)), ", the best arm in ",
-           percent_text(mean(last$best_share))),
-    sep = "\n"
-  )
-  invisible(x)
+           percent_text(mean(last$best_share)))
+  ))
 }
 
 #' @export

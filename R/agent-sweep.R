@@ -144,7 +144,7 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
   abort_if(
     length(unknown) && !"..." %in% known, "settings", unknown, call,
     "The agent has no argument `{unknown[[1L]]}`, a column of `settings`.",
-    i = "{did_you_mean(unknown[[1L]], known)}", i = "It has {quoted_names(known)}."
+    i = did_you_mean(unknown[[1L]], known), i = "It has {quoted_names(known)}."
   )
   check_given(seeds, "They are the seeds for tuning, such as `1:10`.", call = call)
   check_seeds(seeds, call)
@@ -165,7 +165,7 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
 #' @return A list: `trainings`, those of each agent, `runs`, a table, and `interrupted`.
 #' @noRd
 sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, client, call) {
-  started <- proc.time()[["elapsed"]]
+  started <- now()
   of_training <- setdiff(names(formals(train_agent)), c("agent", "env", "...", "client"))
   given <- lapply(formals(train_agent)[of_training], eval, environment(train_agent))
   budget <- any(c("iterations", "total_steps") %in% names(dots))
@@ -215,7 +215,7 @@ sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, clien
     "Interrupted after {finished} of {total} run{?s}; what was finished is returned.",
     function() length(results), length(runs)
   )
-  elapsed <- proc.time()[["elapsed"]] - started
+  elapsed <- now() - started
   runs <- runs[seq_along(results)]
   job <- vapply(runs, `[[`, 0L, "job")
   errors <- vapply(results, function(result) {

@@ -34,10 +34,10 @@
 agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, features = NULL,
                      n = 1, lambda = 0, behavior = NULL) {
   check_policy(policy)
-  check_one_policy(policy, "policy", rlang::current_env())
+  call <- rlang::current_env()
+  check_one_policy(policy, "policy", call)
   check_count(n)
   check_number(lambda, min = 0, max = 1)
-  call <- rlang::current_env()
   # The probabilities of both must be known, and only one step ahead is weighted.
   for (arg in if (!is.null(behavior)) c("policy", "behavior")) {
     if (!inherits(get(arg), c("gym_policy_table", "gym_policy_random"))) {

@@ -147,44 +147,37 @@ check_methods <- function(method, call) {
 check_many_episodes <- function(steps, folds, call) {
   check_count(folds, min = 2, allow_null = TRUE, call = call)
   least <- folds %||% 1L * 2L
-  if (steps$episodes < least) {
-    gym_abort(
-      c(paste0("The data has ", count_of(steps$episodes, "episode"), ", but at least ", least,
-               " are needed to say how sure an estimate is."),
-        i = "`steps_data(episode = )` tells which steps belong together."),
-      class = "gym_error_argument", argument = "data", value = steps$episodes, call = call
-    )
-  }
+  abort_if(
+    steps$episodes < least, "data", steps$episodes, call,
+    'The data has {count_of(steps$episodes, "episode")}, but at least {least} are needed to say
+     how sure an estimate is.',
+    i = "`steps_data(episode = )` tells which steps belong together."
+  )
 }
 
 check_cut <- function(steps, horizon, weighted, call) {
   shortest <- if (length(steps$cut)) min(steps$cut)
-  if (!is.null(shortest) && (horizon %||% Inf) > shortest) {
-    gym_abort(
-      c(paste0(count_of(length(steps$cut), "episode"), " of the data ",
-               if (length(steps$cut) == 1L) "was" else "were", " cut off, the first after ",
-               count_of(shortest, "step"), ", so ", quoted_names(weighted),
-               " cannot know all rewards."),
-        i = paste0("Give a `horizon` of at most ", shortest, ", or `method = \"fqe\"`.")),
-      class = "gym_error_argument", argument = "horizon", value = horizon, call = call
-    )
-  }
+  abort_if(
+    !is.null(shortest) && (horizon %||% Inf) > shortest, "horizon", horizon, call,
+    '{count_of(length(steps$cut), "episode")} of the data
+     {if (length(steps$cut) == 1L) "was" else "were"} cut off, the first after
+     {count_of(shortest, "step")}, so {quoted_names(weighted)} cannot know all rewards.',
+    i = 'Give a `horizon` of at most {shortest}, or `method = "fqe"`.'
+  )
 }
 
 check_interval <- function(interval, method, chosen, call) {
   unfit <- setdiff(method, c("is", "pdis", "dr"))
-  if (interval == "t" && (length(unfit) || chosen$estimated)) {
-    gym_abort(
-      if (length(unfit)) {
-        paste0("`interval = \"t\"` is for \"is\", \"pdis\" and \"dr\", not for ", "\"",
-               paste(unfit, collapse = "\", \""), "\": use \"bootstrap\".")
-      } else {
-        paste("`interval = \"t\"` needs known probabilities of the actions, not estimated ones:",
-              "use \"bootstrap\".")
-      },
-      class = "gym_error_argument", argument = "interval", value = interval, call = call
-    )
-  }
+  abort_if(
+    interval == "t" && (length(unfit) || chosen$estimated), "interval", interval, call,
+    if (length(unfit)) {
+      '`interval = "t"` is for "is", "pdis" and "dr", not for
+       {toString(dQuote(unfit, FALSE))}: use "bootstrap".'
+    } else {
+      '`interval = "t"` needs known probabilities of the actions, not estimated ones: use
+       "bootstrap".'
+    }
+  )
 }
 
 # Warn if the policy takes actions in states for which the table has no data.

@@ -94,13 +94,11 @@ check_horizon <- function(horizon, stages, steps, call) {
   if (stages && is.null(horizon)) {
     abort_argument(horizon, "the number of stages", "horizon", call)
   }
-  if (isTRUE(horizon > steps$longest)) {
-    gym_abort(
-      paste0("`horizon` is ", whole_number_text(horizon), ", but the longest episode of the data ",
-             "has ", count_of(steps$longest, "step"), ": at most these can be used."),
-      class = "gym_error_argument", argument = "horizon", value = horizon, call = call
-    )
-  }
+  abort_if(
+    isTRUE(horizon > steps$longest), "horizon", horizon, call,
+    '`horizon` is {whole_number_text(horizon)}, but the longest episode of the data has
+     {count_of(steps$longest, "step")}: at most these can be used.'
+  )
 }
 
 fit_rule <- function(steps, recipe, call) {

@@ -8,15 +8,13 @@ offline_policy <- function(policy, steps, folds, call) {
   if (inherits(policy, "gym_policy_fitted")) {
     shared <- mean(episode_keys(steps) %in% policy$keys)
     # A few short episodes of other data may be the same by chance.
-    if (is.null(folds) && shared > 0.2) {
-      gym_abort(
-        c(paste0("The policy was learned from the same data (", percent_text(shared), " of the ",
-                 "episodes), so its value there is too large."),
-          i = paste("`folds = 5` learns it again without each fold; or evaluate it on episodes",
-                    "that it has not seen.")),
-        class = "gym_error_argument", argument = "policy", value = policy, call = call
-      )
-    }
+    abort_if(
+      is.null(folds) && shared > 0.2, "policy", policy, call,
+      "The policy was learned from the same data ({percent_text(shared)} of the episodes), so its
+       value there is too large.",
+      i = "`folds = 5` learns it again without each fold; or evaluate it on episodes that it has
+           not seen."
+    )
   }
   if (!is.null(folds) && !inherits(policy, "gym_policy_fitted")) {
     abort_argument(policy, "a rule of `learn_fitted_q()` or `learn_q()` if there are `folds`",
@@ -76,7 +74,7 @@ probabilities_of <- function(policy, states, step, actions, call) {
   } else if (inherits(policy, "gym_policy_random")) {
     matrix(1 / many, nrow(states), many)
   } else if (inherits(policy, "gym_policy")) {
-    known_policy_says(policy, states, actions, call)
+    known_policy_says(policy, states, call)
   } else if (is.function(policy)) {
     policy(states)
   } else {
@@ -91,7 +89,7 @@ probabilities_of <- function(policy, states, step, actions, call) {
 }
 
 # A table and a network have probabilities; another policy says what it does.
-known_policy_says <- function(policy, states, actions, call) {
+known_policy_says <- function(policy, states, call) {
   observed <- if (length(states) == 1L) states[[1L]] else states
   if (inherits(policy$observation_space, "gym_space_discrete")) {
     observed <- encoded_values(policy$observation_space, observed, "state", call)
@@ -113,12 +111,12 @@ checked_probabilities <- function(said, n, actions, call) {
   if (!named() && ncol(said) == length(labels)) colnames(said) <- labels
   good <- is.numeric(said) && nrow(said) == n && named() &&
     all(are_probabilities(said)) && all(abs(rowSums(said) - 1) < sum_tolerance)
-  if (!good) {
-    must <- paste0("return an action for each state, or a matrix of probabilities with ",
-                   count_of(length(labels), "column"), " that add up to 1 in each row")
-    gym_abort(paste0("`policy` must ", must, ", not ", describe_argument(said), "."),
-              class = "gym_error_argument", argument = "policy", value = said, call = call)
-  }
+  abort_if(
+    !good, "policy", said, call,
+    '`policy` must return an action for each state, or a matrix of probabilities with
+     {count_of(length(labels), "column")} that add up to 1 in each row, not
+     {describe_argument(said)}.'
+  )
   check_seen_actions(colSums(said) / max(n, 1L), labels, call)
   place <- match(labels, colnames(said))
   found <- unname(said[, place, drop = FALSE])
@@ -142,15 +140,12 @@ one_of_actions <- function(said, n, actions, call) {
 # The policy's actions must be in the data: nothing is known of others.
 check_seen_actions <- function(shares, labels, call) {
   never <- setdiff(names(shares)[shares > 0], labels)
-  if (length(never)) {
-    gym_abort(
-      c(paste0("The policy takes the action \"", never[[1L]], "\" in ",
-               percent_text(sum(shares[never])), " of the steps, which the data never took."),
-        i = did_you_mean(never[[1L]], labels, "\"%s\""),
-        i = paste0("The data has ", few_names(labels), ".")),
-      class = "gym_error_argument", argument = "policy", value = never, call = call
-    )
-  }
+  abort_if(
+    length(never), "policy", never, call,
+    'The policy takes the action "{never[[1L]]}" in {percent_text(sum(shares[never]))} of the
+     steps, which the data never took.',
+    i = did_you_mean(never[[1L]], labels, "\"%s\""), i = "The data has {few_names(labels)}."
+  )
 }
 
 # Behavior ------------------------------------------------------------------------------
@@ -167,14 +162,12 @@ behavior_of <- function(behavior, steps, call) {
   }
   if (!is.null(behavior) && !inherits(behavior, "formula")) {
     p <- probabilities_of(behavior, steps$state, steps$step, steps$actions, call)[at]
-    if (any(p == 0)) {
-      gym_abort(
-        paste0("By `behavior` the action in step ", steps$step[p == 0][[1L]], " of episode ",
-               steps$labels[[steps$episode[p == 0][[1L]]]], " has the probability 0, but it was ",
-               "taken: correct `behavior`."),
-        class = "gym_error_argument", argument = "behavior", value = behavior, call = call
-      )
-    }
+    abort_if(
+      any(p == 0), "behavior", behavior, call,
+      "By `behavior` the action in step {steps$step[p == 0][[1L]]} of episode
+       {steps$labels[[steps$episode[p == 0][[1L]]]]} has the probability 0, but it was taken:
+       correct `behavior`."
+    )
     return(known_behavior(p, "given by `behavior`"))
   }
   if (is.null(behavior) && is_table_like(steps)) {

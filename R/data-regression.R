@@ -54,16 +54,14 @@ value_formula <- function(formula, steps, linear, call) {
     return(stats::as.formula(paste("value ~", right), globalenv()))
   }
   right <- formula[[length(formula)]]
-  unknown <- setdiff(all.vars(right), c(names(steps$state), "action", "."))
+  known <- c("action", names(steps$state))
+  unknown <- setdiff(all.vars(right), c(known, "."))
   unknown <- unknown[!vapply(unknown, exists, NA, envir = environment(formula))]
-  if (length(unknown)) {
-    gym_abort(
-      c(paste0("`formula` has ", quoted_names(unknown), ", which the data does not have."),
-        i = did_you_mean(unknown[[1L]], c("action", names(steps$state))),
-        i = paste0("It has ", quoted_names(c("action", names(steps$state))), ".")),
-      class = "gym_error_argument", argument = "formula", value = formula, call = call
-    )
-  }
+  abort_if(
+    length(unknown), "formula", formula, call,
+    "`formula` has {quoted_names(unknown)}, which the data does not have.",
+    i = did_you_mean(unknown[[1L]], known), i = "It has {quoted_names(known)}."
+  )
   stats::reformulate(deparse1(right), "value", env = environment(formula))
 }
 
@@ -74,7 +72,6 @@ table_regression <- function(steps) {
   states <- sorted_rows(unique(rbind(steps$state, steps$after[steps$known, , drop = FALSE])))
   keys <- row_keys(states)
   many <- length(steps$actions)
-  cells <- nrow(states) * many
   list(
     label = paste0("a table of ", count_of(nrow(states), "state"), " and ",
                    count_of(many, "action")),
@@ -112,13 +109,11 @@ row_keys <- function(states) row_texts(states, sep = "\r")
 # The values of states that lead to each other like this; episodes may end in `ending`.
 chain_values <- function(moves, reward, ending, call) {
   leads <- function(reached) times(moves, reached) > 0
-  if (!all(closure(leads, seq_along(reward) %in% ending))) {
-    gym_abort(
-      c("The policy's values are infinite: in the data some of its episodes never end.",
-        i = "Give a `discount` below 1, or a `horizon`."),
-      class = "gym_error_argument", argument = "discount", call = call
-    )
-  }
+  abort_if(
+    !all(closure(leads, seq_along(reward) %in% ending)), "discount", NULL, call,
+    "The policy's values are infinite: in the data some of its episodes never end.",
+    i = "Give a `discount` below 1, or a `horizon`."
+  )
   worth <- chain_solver(moves, call)
   worth(pmax(reward, 0)) - worth(pmax(-reward, 0))
 }
@@ -168,10 +163,9 @@ linear_regression <- function(formula, steps, call) {
   }
   solved <- function(gram, right) {
     tryCatch(solve(gram, right, tol = 1e-18), error = function(cnd) {
-      gym_abort(
-        c("The linear model has no solution.",
-          i = "Give a `discount` below 1 or a `horizon`, or a `formula` with fewer terms."),
-        class = "gym_error_argument", argument = "formula", call = call
+      abort_wrong(
+        "formula", NULL, call, "The linear model has no solution.",
+        i = "Give a `discount` below 1 or a `horizon`, or a `formula` with fewer terms."
       )
     })
   }
@@ -241,14 +235,11 @@ model_values <- function(fit, newdata) {
   )
   if (is.list(values)) values <- values$predictions
   values <- as.vector(values)
-  if (!is.numeric(values) || length(values) != nrow(newdata) || anyNA(values)) {
-    gym_abort(
-      c(paste0("The model of class ", class(fit)[[1L]], " does not predict a number for each row ",
-               "of data."),
-        i = "Wrap it in a function of a formula and data whose result `predict()` knows."),
-      class = "gym_error_argument", argument = "model", value = fit, call = NULL
-    )
-  }
+  abort_if(
+    !is.numeric(values) || length(values) != nrow(newdata) || anyNA(values), "model", fit, NULL,
+    "The model of class {class(fit)[[1L]]} does not predict a number for each row of data.",
+    i = "Wrap it in a function of a formula and data whose result `predict()` knows."
+  )
   values
 }
 

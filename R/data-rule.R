@@ -8,13 +8,11 @@ rule_values <- function(policy, states, step = NULL, call = rlang::caller_env())
     levels <- levels(policy$seen[[name]])
     if (!is.null(levels)) {
       new <- setdiff(as.character(states[[name]]), levels)
-      if (length(new)) {
-        gym_abort(
-          c(paste0("The rule knows no ", name, " ", describe_value(new[[1L]]), "."),
-            i = paste0("The data has ", few_names(levels), ".")),
-          class = "gym_error_argument", argument = "newdata", value = states, call = call
-        )
-      }
+      abort_if(
+        length(new), "newdata", states, call,
+        "The rule knows no {name} {describe_value(new[[1L]])}.",
+        i = "The data has {few_names(levels)}."
+      )
       states[[name]] <- factor(states[[name]], levels)
     }
   }

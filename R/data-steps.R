@@ -115,13 +115,11 @@ step_columns <- function(data, episode, state, action, reward, time, terminated,
   reserved <- intersect(
     state, c("episode", "step", "action", "reward", "terminated", "probability")
   )
-  if (length(reserved)) {
-    gym_abort(
-      paste0("The column `", reserved[[1L]], "` has another meaning in steps: give it another ",
-             "name in the state."),
-      class = "gym_error_argument", argument = "state", value = state, call = call
-    )
-  }
+  abort_if(
+    length(reserved), "state", state, call,
+    "The column `{reserved[[1L]]}` has another meaning in steps: give it another name in the
+     state."
+  )
   check_no_missing(data, needed, call)
   list(state = state, time = time, terminated = terminated, probability = probability,
        next_state = next_state)
@@ -132,14 +130,12 @@ step_columns <- function(data, episode, state, action, reward, time, terminated,
 check_no_missing <- function(data, columns, call) {
   for (name in columns) {
     missing <- which(is.na(data[[name]]))
-    if (length(missing)) {
-      gym_abort(
-        c(paste0("The column `", name, "` of `data` has missing values in ",
-                 count_of(length(missing), "row"), ": ", rows_text(missing), "."),
-          i = "Leave out whole episodes with missing values, or fill the values in."),
-        class = "gym_error_argument", argument = "data", value = data, call = call
-      )
-    }
+    abort_if(
+      length(missing), "data", data, call,
+      'The column `{name}` of `data` has missing values in {count_of(length(missing), "row")}:
+       {rows_text(missing)}.',
+      i = "Leave out whole episodes with missing values, or fill the values in."
+    )
   }
 }
 
@@ -160,24 +156,22 @@ check_step_columns <- function(steps, state, call) {
     }
   }
   action <- steps$action
-  if (is.numeric(action) && !all(are_whole_numbers(action)) || !is.atomic(action)) {
-    gym_abort(
-      c("The actions must be text, a factor, logical values or whole numbers.",
-        i = "`cut()` makes a factor of numbers."),
-      class = "gym_error_argument", argument = "action", value = action, call = call
-    )
-  }
+  abort_if(
+    is.numeric(action) && !all(are_whole_numbers(action)) || !is.atomic(action),
+    "action", action, call,
+    "The actions must be text, a factor, logical values or whole numbers.",
+    i = "`cut()` makes a factor of numbers."
+  )
 }
 
 check_once <- function(steps, time, name, call) {
   again <- which(duplicated(data.frame(steps$episode, time)))
   if (length(again)) {
     at <- again[[1L]]
-    gym_abort(
-      paste0("Rows ", steps$.row[[at - 1L]], " and ", steps$.row[[at]], " of `data` are steps of ",
-             "the same episode with the same `", name, "`, ", time[[at]],
-             ": number the steps of each episode differently."),
-      class = "gym_error_argument", argument = "data", value = steps, call = call
+    abort_wrong(
+      "data", steps, call,
+      "Rows {steps$.row[[at - 1L]]} and {steps$.row[[at]]} of `data` are steps of the same episode
+       with the same `{name}`, {time[[at]]}: number the steps of each episode differently."
     )
   }
 }
@@ -185,12 +179,12 @@ check_once <- function(steps, time, name, call) {
 check_ends_once <- function(steps, last, call) {
   early <- which(steps$terminated & !last)
   if (length(early)) {
-    gym_abort(
-      c(paste0("Episode ", steps$episode[[early[[1L]]]], " ends in row ",
-               steps$.row[[early[[1L]]]], " of `data` and goes on in row ",
-               steps$.row[[early[[1L]] + 1L]], "."),
-        i = "Give what follows an end another value of `episode`."),
-      class = "gym_error_argument", argument = "data", value = steps, call = call
+    at <- early[[1L]]
+    abort_wrong(
+      "data", steps, call,
+      "Episode {steps$episode[[at]]} ends in row {steps$.row[[at]]} of `data` and goes on in row
+       {steps$.row[[at + 1L]]}.",
+      i = "Give what follows an end another value of `episode`."
     )
   }
 }
@@ -278,7 +272,7 @@ print.gym_steps <- function(x, ...) {
   kinds <- vapply(steps$state, function(column) {
     if (is.numeric(column)) "number" else count_of(length(unique(column)), "value")
   }, "")
-  cat(
+  print_lines(x, c(
     paste0("<", count_of(nrow(x), "step"), " of ", count_of(steps$episodes, "episode"), ", ",
            paste(unique(lengths), collapse = " to "), " steps each, ",
            if (cut) paste(whole_number_text(cut), "cut off") else "all ended", ">"),
@@ -286,10 +280,8 @@ print.gym_steps <- function(x, ...) {
     paste0("Actions: ", toString(utils::head(paste(steps$actions, percent_text_each(share)), 8L)),
            if (length(share) > 8L) ", ..."),
     paste0("Mean return: ", number_text(sum(steps$reward) / steps$episodes),
-           if (!is.null(steps$probability)) "; with the probabilities of the actions"),
-    sep = "\n"
-  )
-  invisible(x)
+           if (!is.null(steps$probability)) "; with the probabilities of the actions")
+  ))
 }
 
 percent_text_each <- function(share) vapply(share, percent_text, "")

@@ -44,8 +44,7 @@ as.raster.gym_frame <- function(x, ...) {
 
 #' @export
 print.gym_frame <- function(x, ...) {
-  cat("<gym_frame: ", ncol(x), " x ", nrow(x), " pixels>\n", sep = "")
-  invisible(x)
+  print_lines(x, paste0("<gym_frame: ", ncol(x), " x ", nrow(x), " pixels>"))
 }
 
 # The frames of an episode ----------------------------------------------------------------

@@ -89,15 +89,10 @@ check_num_workers <- function(num_workers, num_envs, call) {
 }
 
 check_has_sub_envs <- function(num_envs, x, arg, call) {
-  if (is.null(num_envs)) {
-    gym_abort(
-      c(
-        paste0("`", arg, "` is for an environment with sub-environments."),
-        i = "Give their number as `num_envs`."
-      ),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
-  }
+  abort_if(
+    is.null(num_envs), arg, x, call, "`{arg}` is for an environment with sub-environments.",
+    i = "Give their number as `num_envs`."
+  )
 }
 
 check_sub_env_seeds <- function(seed, num_envs, call) {
@@ -147,16 +142,11 @@ check_which <- function(which, instance, call) {
 }
 
 check_is_vector_env <- function(instance, x, arg, call) {
-  if (is.null(instance$num_envs)) {
-    gym_abort(
-      c(
-        paste0("`", arg, "` is for an environment with sub-environments; this ", instance$spec$id,
-               " has none."),
-        i = "`gym_make()` makes one with `num_envs`."
-      ),
-      class = "gym_error_argument", argument = arg, value = x, call = call
-    )
-  }
+  abort_if(
+    is.null(instance$num_envs), arg, x, call,
+    "`{arg}` is for an environment with sub-environments; this {instance$spec$id} has none.",
+    i = "`gym_make()` makes one with `num_envs`."
+  )
 }
 
 # Infos -----------------------------------------------------------------------------------

@@ -155,10 +155,7 @@ format.gym_wrapped <- function(x, ...) {
 }
 
 #' @export
-print.gym_wrapped <- function(x, ...) {
-  cat("<", format(x), ">\n", sep = "")
-  invisible(x)
-}
+print.gym_wrapped <- function(x, ...) print_lines(x, paste0("<", format(x), ">"))
 
 check_wrappers <- function(wrappers, call = rlang::caller_env()) {
   # A wrapper is a list of its name and its arguments, which have names.

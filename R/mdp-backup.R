@@ -63,14 +63,12 @@ with_flow <- function(backup) {
 most_cells <- 1e8
 
 check_fits_memory <- function(cells, what, call, arg = "model", hint = NULL) {
-  if (cells > most_cells) {
-    gym_abort(
-      c(paste0(what, " needs tables of ", whole_number_text(cells), " numbers; at most ",
-               whole_number_text(most_cells), " are possible."),
-        i = hint),
-      class = "gym_error_argument", argument = arg, value = cells, call = call
-    )
-  }
+  abort_if(
+    cells > most_cells, arg, cells, call,
+    "{what} needs tables of {whole_number_text(cells)} numbers; at most
+     {whole_number_text(most_cells)} are possible.",
+    i = hint
+  )
 }
 
 # Numbers of states, counted from 1.

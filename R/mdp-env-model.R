@@ -113,13 +113,11 @@ starts_of <- function(env, model, call) {
   seen <- c(first, unlist(lapply(more, function(again) reset())))
   states <- state_numbers(model$observation_space)
   stuck <- setdiff(seen, model$transitions$state)
-  if (length(stuck)) {
-    gym_abort(
-      paste0("`reset()` of ", environment_label(env), " starts in state ", stuck[[1L]],
-             ", but no row of the model leaves that state."),
-      class = "gym_error_argument", argument = "model", value = model, call = call
-    )
-  }
+  abort_if(
+    length(stuck), "model", model, call,
+    "`reset()` of {environment_label(env)} starts in state {stuck[[1L]]}, but no row of the model
+     leaves that state."
+  )
   count <- length(unique(seen))
   if (count > 1L) {
     cli::cli_inform(
@@ -165,24 +163,22 @@ check_has_numbers <- function(space, numbers, name, env, call) {
   what <- sub("_", " ", name)
   if (!inherits(space, "gym_space_discrete")) {
     count <- space_index(space)$count
-    gym_abort(
-      c(paste0("A model needs an ", what, " that is Discrete for now, but ",
-               environment_label(env), " has ", format(space), "."),
-        i = if (!is.null(count)) {
-          paste0("Code the parts as one number, the last part changing first, with `",
-                 name, " = space_discrete(", sprintf("%.0f", count), ")`.")
-        }),
-      class = "gym_error_argument", argument = "model", value = space, call = call
+    abort_wrong(
+      "model", space, call,
+      "A model needs an {what} that is Discrete for now, but {environment_label(env)} has
+       {format(space)}.",
+      i = if (!is.null(count)) {
+        'Code the parts as one number, the last part changing first, with `{name} =
+         space_discrete({sprintf("%.0f", count)})`.'
+      }
     )
   }
   bounds <- space_bounds(space)
   beyond <- numbers[numbers < bounds$low | numbers > bounds$high]
-  if (length(beyond)) {
-    gym_abort(
-      c(paste0("The model of ", environment_label(env), " has the number ", beyond[[1L]],
-               ", which its ", what, " ", format(space), " does not have."),
-        i = "`space_discrete(n, start)` has the numbers from `start` to `start + n - 1`."),
-      class = "gym_error_argument", argument = "model", value = beyond[[1L]], call = call
-    )
-  }
+  abort_if(
+    length(beyond), "model", beyond[[1L]], call,
+    "The model of {environment_label(env)} has the number {beyond[[1L]]}, which its {what}
+     {format(space)} does not have.",
+    i = "`space_discrete(n, start)` has the numbers from `start` to `start + n - 1`."
+  )
 }

@@ -127,10 +127,10 @@ sparse_solver <- function(weight) {
 }
 
 abort_unsolved <- function(states, call) {
-  gym_abort(
-    c(paste0("The equations of ", count_of(states, "state"), " cannot be solved: they need too ",
-             "much memory, or episodes hardly ever end."),
-      i = "Give a lower `discount`, or a `horizon`."),
-    class = "gym_error_argument", argument = "discount", call = call
+  abort_wrong(
+    "discount", NULL, call,
+    'The equations of {count_of(states, "state")} cannot be solved: they need too much memory, or
+     episodes hardly ever end.',
+    i = "Give a lower `discount`, or a `horizon`."
   )
 }

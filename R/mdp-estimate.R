@@ -36,28 +36,24 @@ estimate_model.default <- function(x, ...) {
 
 #' @export
 estimate_model.gym_rollout <- function(x, ...) {
+  call <- rlang::current_env()
   steps <- x$steps
   # The spaces of the environment, if the policy has them; a function does not.
   spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
   if (is.data.frame(steps)) {
     spaces <- counted_states(spaces, steps)
-    steps <- steps_by_number(steps, spaces, rlang::current_env())
+    steps <- steps_by_number(steps, spaces, call)
   }
   after <- grep("^next_", names(steps), value = TRUE)
-  if (!is.data.frame(steps) || !length(after)) {
-    gym_abort(
-      c("The rollout lacks the steps, or the next observations.",
-        i = "Play it with `rollout(steps = TRUE, next_observation = TRUE)`."),
-      class = "gym_error_argument", argument = "x", value = x
-    )
-  }
-  if (length(after) != 1L || !is.integer(steps[[after]]) || !is.integer(steps$action)) {
-    gym_abort(
-      paste0("A model has numbered states and actions, but those of ", x$env_id,
-             " are not Discrete."),
-      class = "gym_error_argument", argument = "x", value = x
-    )
-  }
+  abort_if(
+    !is.data.frame(steps) || !length(after), "x", x, call,
+    "The rollout lacks the steps, or the next observations.",
+    i = "Play it with `rollout(steps = TRUE, next_observation = TRUE)`."
+  )
+  abort_if(
+    length(after) != 1L || !is.integer(steps[[after]]) || !is.integer(steps$action), "x", x, call,
+    "A model has numbered states and actions, but those of {x$env_id} are not Discrete."
+  )
   table <- data.frame(
     steps[intersect(c("candidate", "episode", "step"), names(steps))],
     state = steps[[sub("^next_", "", after)]], action = steps$action,
@@ -146,13 +142,12 @@ check_order <- function(steps, x, call) {
   wrong <- which(before$episode == after$episode & next_one & apart)
   if (length(wrong)) {
     i <- wrong[[1L]]
-    gym_abort(
-      c(paste0("Row ", after$row[[i]], " of `x` does not follow row ", before$row[[i]], ": that ",
-               "one leads to state ", before$next_state[[i]],
-               if (before$terminated[[i]]) ", where the episode ends", ", and row ",
-               after$row[[i]], " starts in state ", after$state[[i]], "."),
-        i = "The columns `episode` and `step` tell which row follows which."),
-      class = "gym_error_argument", argument = "x", value = x, call = call
+    abort_wrong(
+      "x", x, call,
+      'Row {after$row[[i]]} of `x` does not follow row {before$row[[i]]}: that one leads to state
+       {before$next_state[[i]]}{if (before$terminated[[i]]) ", where the episode ends"}, and row
+       {after$row[[i]]} starts in state {after$state[[i]]}.',
+      i = "The columns `episode` and `step` tell which row follows which."
     )
   }
 }

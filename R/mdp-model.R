@@ -80,16 +80,12 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
 spanned_space <- function(numbers, what, call = rlang::caller_env()) {
   ends <- range(numbers)
   count <- as.double(ends[[2L]]) - ends[[1L]] + 1
-  if (count > most_values) {
-    gym_abort(
-      c(paste0("The ", what, " are numbered from ", ends[[1L]], " to ", ends[[2L]],
-               ", which makes ", whole_number_text(count),
-               " of them; at most ", whole_number_text(most_values),
-               " are possible."),
-        i = "Number them without gaps."),
-      class = "gym_error_argument", argument = "transitions", call = call
-    )
-  }
+  abort_if(
+    count > most_values, "transitions", NULL, call,
+    "The {what} are numbered from {ends[[1L]]} to {ends[[2L]]}, which makes
+     {whole_number_text(count)} of them; at most {whole_number_text(most_values)} are possible.",
+    i = "Number them without gaps."
+  )
   space_discrete(count, ends[[1L]])
 }
 
@@ -162,29 +158,26 @@ check_probabilities <- function(table, states, actions, call) {
   wrong <- which(abs(sums - 1) > sum_tolerance)
   if (length(wrong)) {
     at <- strsplit(names(sums)[[wrong[[1L]]]], " ", fixed = TRUE)[[1L]]
-    gym_abort(
-      c(paste0("The probabilities of action ", named_numbers(actions, as.integer(at[[2L]])),
-               " in state ", named_numbers(states, as.integer(at[[1L]])), " add up to ",
-               format(sums[[wrong[[1L]]]], digits = 10), ", not to 1."),
-        i = if (length(wrong) > 1L) {
-          paste0("The same holds for ", count_of(length(wrong) - 1, "further pair"),
-                 " of a state and an action.")
-        }),
-      class = "gym_error_argument", argument = "transitions", call = call
+    abort_wrong(
+      "transitions", NULL, call,
+      "The probabilities of action {named_numbers(actions, as.integer(at[[2L]]))} in state
+       {named_numbers(states, as.integer(at[[1L]]))} add up to
+       {format(sums[[wrong[[1L]]]], digits = 10)}, not to 1.",
+      i = if (length(wrong) > 1L) {
+        'The same holds for {count_of(length(wrong) - 1, "further pair")} of a state and an action.'
+      }
     )
   }
 }
 
 check_ends <- function(table, states, call) {
   stuck <- !table$terminated & table$probability > 0 & !table$next_state %in% table$state
-  if (any(stuck)) {
-    state <- named_numbers(states, table$next_state[stuck][[1L]])
-    gym_abort(
-      c(paste0("No row leaves state ", state, ", and arriving there does not end the episode."),
-        i = "Set `terminated` to TRUE in the rows that lead there, or add rows that leave it."),
-      class = "gym_error_argument", argument = "transitions", call = call
-    )
-  }
+  abort_if(
+    any(stuck), "transitions", NULL, call,
+    "No row leaves state {named_numbers(states, table$next_state[stuck][[1L]])}, and arriving there
+     does not end the episode.",
+    i = "Set `terminated` to TRUE in the rows that lead there, or add rows that leave it."
+  )
 }
 
 start_probabilities <- function(start, table, states, call) {
@@ -222,14 +215,12 @@ start_probabilities <- function(start, table, states, call) {
 #' @export
 print.gym_model <- function(x, ...) {
   starts <- names(x$start)[x$start > 0]
-  cat(
+  print_lines(x, paste0(
     "<model of ", x$spec$id, ": ", count_of(length(x$start), "state"), ", ",
     count_of(as.integer(x$action_space$n), "action"), ", ",
     count_of(nrow(x$transitions), "transition"), ", starts in ",
-    if (length(starts) == 1L) paste("state", starts) else count_of(length(starts), "state"), ">\n",
-    sep = ""
-  )
-  invisible(x)
+    if (length(starts) == 1L) paste("state", starts) else count_of(length(starts), "state"), ">"
+  ))
 }
 
 #' @export
@@ -267,12 +258,10 @@ model_arrays <- function(model) {
   states <- length(model$start)
   actions <- as.integer(model$action_space$n)
   cells <- (states + 1)^2 * actions
-  if (cells > .Machine$integer.max) {
-    gym_abort(
-      paste0("An array of ", whole_number_text(cells), " numbers is too large."),
-      class = "gym_error_argument", argument = "model", value = model
-    )
-  }
+  abort_if(
+    cells > .Machine$integer.max, "model", model, rlang::current_env(),
+    "An array of {whole_number_text(cells)} numbers is too large."
+  )
   table <- model$transitions
   from <- state_rows(model, table$state)
   to <- ifelse(table$terminated, states + 1L, state_rows(model, table$next_state))

@@ -132,12 +132,11 @@ check_possible <- function(moves, model, row, action, pair, over) {
     actions <- state_numbers(model$action_space)
     at <- row[barred][[1L]]
     has <- actions[!is.na(moves$first[pair_rows(model, at, actions)])]
-    gym_abort(
-      c(paste0("Action ", action[barred][[1L]], " cannot be taken in state ",
-               moves$states[[at]], " of ", model$spec$id, "."),
-        i = paste0("Valid actions there: ", toString(has),
-                   ". Use -Inf for the others in a `policy_table()`.")),
-      class = "gym_error_argument", argument = "action", value = action, call = NULL
+    abort_wrong(
+      "action", action, NULL,
+      "Action {action[barred][[1L]]} cannot be taken in state {moves$states[[at]]} of
+       {model$spec$id}.",
+      i = "Valid actions there: {toString(has)}. Use -Inf for the others in a `policy_table()`."
     )
   }
 }

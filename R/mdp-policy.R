@@ -27,11 +27,11 @@ policy_matrix <- function(policy, model, call) {
   barred <- probabilities > 0 & !possible
   if (any(barred & rowSums(possible) > 0)) {
     at <- which(barred & rowSums(possible) > 0, arr.ind = TRUE)[1L, ]
-    gym_abort(
-      paste0("The policy takes action ", value_labels(model$action_space)[[at[[2L]]]],
-             " in state ", value_labels(model$observation_space)[[at[[1L]]]],
-             ", where the model does not have that action."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    abort_wrong(
+      "policy", policy, call,
+      "The policy takes action {value_labels(model$action_space)[[at[[2L]]]]} in state
+       {value_labels(model$observation_space)[[at[[1L]]]]}, where the model does not have that
+       action."
     )
   }
   probabilities[barred] <- 0
@@ -42,11 +42,11 @@ policy_matrix <- function(policy, model, call) {
 in_model_order <- function(policy, model, call) {
   states <- names(model$start)
   order_of <- function(given, forms, what, labels) {
-    places_of_names(given, forms, labels) %||% gym_abort(
-      c(paste0("The names of `policy` must be those of the ", what, ", ", few_names(forms[[1L]]),
-               ", not ", few_names(given), "."),
-        i = "Without names it is taken in their order: `unname()` removes them."),
-      class = "gym_error_argument", argument = "policy", value = policy, call = call
+    places_of_names(given, forms, labels) %||% abort_wrong(
+      "policy", policy, call,
+      "The names of `policy` must be those of the {what}, {few_names(forms[[1L]])}, not
+       {few_names(given)}.",
+      i = "Without names it is taken in their order: `unname()` removes them."
     )
   }
   if (!is.matrix(policy)) {

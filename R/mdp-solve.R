@@ -119,11 +119,10 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
 }
 
 abort_no_end <- function(model, call) {
-  gym_abort(
-    c(paste0("Episodes of ", model$spec$id, " never end, and without a ",
-             "discount their values are infinite."),
-      i = "Give a `discount` below 1, or a `horizon`."),
-    class = "gym_error_argument", argument = "discount", value = 1, call = call
+  abort_wrong(
+    "discount", 1, call,
+    "Episodes of {model$spec$id} never end, and without a discount their values are infinite.",
+    i = "Give a `discount` below 1, or a `horizon`."
   )
 }
 
@@ -212,17 +211,17 @@ print.gym_solution <- function(x, ...) {
   } else {
     paste0("by ", sub("_", " ", x$method), ", ", count_of(x$sweeps, "sweep"))
   }
-  cat("Solution of ", x$model$spec$id, ": ", count_of(length(x$values), "state"), ", ",
-      count_of(ncol(x$q), "action"), ", discount ", number_text(x$discount), " (", how, ")\n",
-      sep = "")
-  cat("Value of the start:\n")
   rows <- c(stats::setNames(x$start_value, solution_meaning(x)))
   if (!is.null(x$limited)) {
     limit <- x$model$spec$max_episode_steps
     rows[[paste("the same policy, cut off after", count_of(limit, "step"))]] <- x$limited
   }
-  cat(paste0("  ", format(names(rows)), "  ", vapply(rows, format, "", digits = 6L)), sep = "\n")
-  invisible(x)
+  print_lines(x, c(
+    paste0("Solution of ", x$model$spec$id, ": ", count_of(length(x$values), "state"), ", ",
+           count_of(ncol(x$q), "action"), ", discount ", number_text(x$discount), " (", how, ")"),
+    "Value of the start:",
+    paste0("  ", format(names(rows)), "  ", vapply(rows, format, "", digits = 6L))
+  ))
 }
 
 solution_meaning <- function(x) {
@@ -247,12 +246,10 @@ as.data.frame.gym_solution <- function(x, row.names = NULL, optional = FALSE, ..
 
 #' @export
 predict.gym_solution <- function(object, newdata, ...) {
-  if (is.null(object$policy)) {
-    gym_abort(
-      c("The policy of a solution with a horizon depends on the step, not only on the state.",
-        i = "Its element `actions` has an action for each state and step."),
-      class = "gym_error_argument", argument = "object", value = object
-    )
-  }
+  abort_if(
+    is.null(object$policy), "object", object, rlang::current_env(),
+    "The policy of a solution with a horizon depends on the step, not only on the state.",
+    i = "Its element `actions` has an action for each state and step."
+  )
   act(object$policy, newdata)
 }

@@ -225,11 +225,11 @@ choice_probabilities <- function(backup, choice) {
 }
 
 abort_endless <- function(state, call) {
-  gym_abort(
-    c(paste0("With a discount of 1 some values are infinite, as that of row ", state, " of the ",
-             "states: rewards go on there forever."),
-      i = "Give a `discount` below 1, or a `horizon`."),
-    class = "gym_error_argument", argument = "discount", call = call
+  abort_wrong(
+    "discount", NULL, call,
+    "With a discount of 1 some values are infinite, as that of row {state} of the states: rewards
+     go on there forever.",
+    i = "Give a `discount` below 1, or a `horizon`."
   )
 }
 

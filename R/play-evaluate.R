@@ -222,7 +222,6 @@ same_episodes <- function(seed, episodes, max_steps) {
 #' @export
 print.gym_objective <- function(x, ...) {
   policy <- attr(x, "policy")
-  cat("<objective: minus the mean return of ", format(policy), " in ", env_text(policy), ">\n",
-      sep = "")
-  invisible(x)
+  print_lines(x, paste0("<objective: minus the mean return of ", format(policy), " in ",
+                        env_text(policy), ">"))
 }

@@ -86,7 +86,7 @@ await_workers <- function(crew) {
   ready <- select_workers(crew$running)
   if (is.null(ready)) {
     # A hundredth of the time since the last task was sent.
-    waited <- proc.time()[["elapsed"]] - max(vapply(crew$running, function(one) one$started, 0))
+    waited <- now() - max(vapply(crew$running, function(one) one$started, 0))
     has_deadline <- is.finite(crew$deadline(crew$slowest))
     longest <- if (has_deadline) longest_wait else longest_wait_without_deadline
     Sys.sleep(min(longest, max(0.002, waited / 100)))
@@ -154,7 +154,7 @@ launch_tasks <- function(crew) {
       ), "Set `future::plan(\"sequential\")` and then your plan again, to go on with workers.")
       crew$again <- c(list(one), crew$again)
     } else {
-      one$started <- proc.time()[["elapsed"]]
+      one$started <- now()
       crew$running <- c(crew$running, list(one))
     }
   }
@@ -200,7 +200,7 @@ do_here <- function(crew) {
 # Checks a task that may be `ready`. It is lost if it is not ready for too long.
 look_at <- function(crew, number, ready) {
   one <- crew$running[[number]]
-  seconds <- proc.time()[["elapsed"]] - one$started
+  seconds <- now() - one$started
   state <- tryCatch(
     if (ready && future::resolved(one$future)) future::value(one$future),
     error = function(cnd) list(failed = first_message_line(cnd))

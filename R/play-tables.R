@@ -156,7 +156,4 @@ format.gym_provenance <- function(x, ...) {
 }
 
 #' @export
-print.gym_provenance <- function(x, ...) {
-  writeLines(format(x))
-  invisible(x)
-}
+print.gym_provenance <- function(x, ...) print_line(x)

@@ -54,7 +54,7 @@ new_worker_task <- function(kind, recipe, versions, ...) {
 #'   `host`, `pid`, `seconds`, `BLAS`.
 #' @noRd
 do_task <- function(task) {
-  started <- proc.time()[["elapsed"]]
+  started <- now()
   done <- tryCatch(
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
@@ -86,7 +86,7 @@ do_task <- function(task) {
   )
   c(done, list(
     host = Sys.info()[["nodename"]], pid = Sys.getpid(), BLAS = extSoftVersion()[["BLAS"]],
-    seconds = proc.time()[["elapsed"]] - started
+    seconds = now() - started
   ))
 }
 

@@ -247,10 +247,8 @@ print.gym_decision_map <- function(x, ...) {
   few <- utils::head(x$at, 4L)
   held <- paste(names(few), "=", number_text_each(few), collapse = ", ")
   more <- if (length(x$at) > 4L) paste(", and", length(x$at) - 4L, "more")
-  cat(
+  print_lines(x, c(
     paste0("Decision map", if (!is.null(x$env_id)) paste0(" in ", env_text(x)), ": ", shows),
-    paste0("Policy: ", policy_text(x$policy)), if (length(x$at)) paste0("Held: ", held, more),
-    sep = "\n"
-  )
-  invisible(x)
+    paste0("Policy: ", policy_text(x$policy)), if (length(x$at)) paste0("Held: ", held, more)
+  ))
 }

@@ -43,7 +43,7 @@ policy_candidates <- function(policy, weights) {
      column, not {count_of(ncol(weights), "column")}.',
     i = if (nrow(weights) == count) "`t(weights)` has a candidate in each row."
   )
-  check_that(!anyNA(weights), weights, "without missing values", "weights", call)
+  if (anyNA(weights)) abort_argument(weights, "without missing values", "weights", call)
   storage.mode(weights) <- "double"
   new_candidates(policy, weights)
 }

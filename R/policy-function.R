@@ -77,8 +77,7 @@ abort_action_count <- function(actions, count, n, vector_env) {
     'The policy must give one action for
      {if (n == 1L) "the one observation" else paste("each of", n, "observations")}, not
      {returned}.',
-    i = "{observations_hint(vector_env$observation_space)}",
-    i = "{actions_hint(vector_env$action_space)}"
+    i = observations_hint(vector_env$observation_space), i = actions_hint(vector_env$action_space)
   )
 }
 
@@ -165,7 +164,7 @@ actions_hint <- function(space) {
 policy_memory <- function(act, initial) {
   call <- rlang::current_env()
   must <- "a function of `observation` and `memory`"
-  check_that(is.function(act), act, must, "act", call)
+  if (!is.function(act)) abort_argument(act, must, "act", call)
   takes <- names(formals(args(act)))
   if (!"..." %in% takes && length(takes) < 2L) {
     alone <- if (length(takes)) paste0("`", takes, "` alone") else "nothing"

@@ -159,7 +159,7 @@ check_labels <- function(policy, space, env_id, call) {
     length(strange), "policy", policy, call,
     "The levels of the model's response, {quoted_names(policy$labels)}, must be actions;
      {quoted_names(strange)} {if (length(strange) > 1L) 'are' else 'is'} none.",
-    i = "{actions_text(env_id, space)}",
+    i = actions_text(env_id, space),
     i = "`glm(factor(action) ~ ..., binomial)` is fitted to their numbers."
   )
 }

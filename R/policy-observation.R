@@ -17,7 +17,7 @@ observation_rows <- function(observation, space, n = NULL, arg = "observation",
   # The number of dimensions of an observation: none in a discrete space, which has no shape.
   rank <- if (is.null(space)) 1L else length(space$shape)
   observation <- numbers_by_name(observation, space, n, arg, call)
-  check_that(!is.null(observation), observation, "an observation", arg, call)
+  if (is.null(observation)) abort_argument(observation, "an observation", arg, call)
   if (rank == 0L && prod(dim(observation)[-1L]) != 1) {
     must <- paste("one value of", format(space), "in each row instead of several")
     abort_argument(observation, must, arg, call)

@@ -59,7 +59,9 @@ check_weights <- function(weights, sizes, bias = FALSE, name = "weights",
 }
 
 check_layer <- function(layer, wanted, bias, arg, call) {
-  check_that(is.matrix(layer) && is.numeric(layer), layer, "a numeric matrix", arg, call)
+  if (!is.matrix(layer) || !is.numeric(layer)) {
+    abort_argument(layer, "a numeric matrix", arg, call)
+  }
   if (!identical(dim(layer), as.integer(wanted))) {
     turned <- identical(rev(dim(layer)), as.integer(wanted))
     abort_wrong(
@@ -69,7 +71,7 @@ check_layer <- function(layer, wanted, bias, arg, call) {
       i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
     )
   }
-  check_that(!anyNA(layer), layer, "without missing values", arg, call)
+  if (anyNA(layer)) abort_argument(layer, "without missing values", arg, call)
 }
 
 # The weights as one vector, layer after layer, each matrix column after column, and then the
@@ -158,7 +160,9 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
     abort_argument(value, paste("a vector of", count_of(count, "number")), "value",
                    rlang::current_env())
   }
-  check_that(!anyNA(value), value, "without missing values", "value", rlang::current_env())
+  if (anyNA(value)) {
+    abort_argument(value, "without missing values", "value", rlang::current_env())
+  }
   with_weights(object, as.numeric(value))
 }
 

@@ -152,7 +152,7 @@ check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   if (!is.list(x) || is.object(x)) {
     return(check_policy(x, arg, call))
   }
-  check_that(length(x), x, "a policy, or a list of at least one", arg, call)
+  if (!length(x)) abort_argument(x, "a policy, or a list of at least one", arg, call)
   x <- lapply(x, trained_policy)
   for (i in seq_along(x)) {
     check_policy(x[[i]], paste0(arg, "[[", i, "]]"), call)

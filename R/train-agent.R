@@ -362,14 +362,13 @@ train_in <- function(vector_env, run, progress, call) {
   } else {
     bind_with_seed(settings$policy, vector_env, settings$seed, call)
   }
-  generator <- new_generator(settings$seed)
   state <- rlang::env(
     agent = settings$agent, iteration = 0L, steps = 0, history = list(), evaluations = list(),
     episodes = list(), final = NULL, solved = FALSE, ended = FALSE,
     streams = new_streams(settings$seed),
     # Evaluations have their own streams, so that training does not depend on them.
-    evaluation_streams = new_streams(with_generator(generator, draw_seed())),
-    started = proc.time()[["elapsed"]], report = function(ended) NULL, log = function() NULL,
+    evaluation_streams = new_streams(with_generator(new_generator(settings$seed), draw_seed())),
+    started = now(), report = function(ended) NULL, log = function() NULL,
     checkpoint = function(last = FALSE) NULL
   )
   if (has_started(settings$agent)) {

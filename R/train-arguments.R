@@ -77,7 +77,7 @@ abort_no_budget <- function(names, agent, presets, call) {
   abort_wrong(
     "iterations", NULL, call,
     "Training needs a budget: give `iterations`, or `total_steps` of the environment.",
-    i = "`total_steps = 100000` is enough for a first look.", i = "{presets}",
+    i = "`total_steps = 100000` is enough for a first look.", i = presets,
     i = if (length(names)) {
       "These were taken for arguments of the environment: {quoted_names(names)}."
     },

@@ -95,7 +95,7 @@ rest_per_writing <- 9
 #' @param checkpoint As returned by [open_checkpoint()]. If there is no file yet, it is written now.
 #' @param state A function that returns the value to write.
 #' @param what What is kept, `"search"` or `"training"`.
-#' @return A function that writes the file if `now` is `TRUE` or the waiting time is over.
+#' @return A function that writes the file if it is the `last` time or the waiting time is over.
 #' @noRd
 checkpoint_writer <- function(checkpoint, state, what, call) {
   path <- checkpoint$path
@@ -127,9 +127,9 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
     write_checkpoint(path, own)
     written <<- file_mark(path)
   }
-  function(now = FALSE) {
-    began <- proc.time()[["elapsed"]]
-    if (!now && began < rest_until) {
+  function(last = FALSE) {
+    began <- now()
+    if (!last && began < rest_until) {
       return(invisible())
     }
     tryCatch(
@@ -143,7 +143,7 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
         failed <<- TRUE
       }
     )
-    ended <- proc.time()[["elapsed"]]
+    ended <- now()
     rest_until <<- ended + rest_per_writing * (ended - began)
   }
 }

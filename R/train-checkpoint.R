@@ -86,7 +86,7 @@ training_checkpoint <- function(state, file, settings, call) {
   }
   state$path <- file$path
   without_memory <- memory_writer(file$path, file$saved$training$agent$memory$key)
-  write <- checkpoint_writer(file, function() {
+  checkpoint_writer(file, function() {
     training <- mget(kept_of_training, state)
     training$agent <- without_memory(training$agent)
     list(
@@ -95,10 +95,9 @@ training_checkpoint <- function(state, file, settings, call) {
       policy = settings$policy, seed = settings$seed, provenance = settings$provenance,
       training = training, streams = saved_streams(state$streams),
       evaluation_streams = saved_streams(state$evaluation_streams),
-      elapsed = proc.time()[["elapsed"]] - state$started
+      elapsed = now() - state$started
     )
   }, settings$what, call)
-  function(last = FALSE) write(now = last)
 }
 
 resume_training <- function(state, saved, path, call = NULL) {
@@ -122,7 +121,7 @@ finished_training <- function(run, client) {
   settings["target"] <- list(saved$target)
   settings[names(saved$server)] <- saved$server
   settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
-  state <- rlang::env(started = proc.time()[["elapsed"]])
+  state <- rlang::env(started = now())
   resume_training(state, saved, run$file$path)
   search <- settings$search
   if (!is_over(settings, state) || !search && is.null(state$final)) {
@@ -148,8 +147,8 @@ inform_resumed <- function(text, .envir = parent.frame()) {
 #' @export
 print.gym_checkpoint <- function(x, ...) {
   if (!identical(x$format, checkpoint_format)) {
-    cat("<checkpoint by gym ", x$version, ", which this version cannot read>\n", sep = "")
-    return(invisible(x))
+    line <- paste0("<checkpoint by gym ", x$version, ", which this version cannot read>")
+    return(print_lines(x, line))
   }
   saved <- unserialize(x$state)
   training <- saved$training

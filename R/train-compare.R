@@ -91,10 +91,10 @@ compare_trainings <- function(..., total_steps = NULL, reference = NULL, reps = 
   check_no_steps(...names(), call)
   check_number(total_steps, min = 0, allow_null = TRUE)
   columns <- c("env_id", "low", "high")
-  check_that(
-    is.null(reference) || is.data.frame(reference) && all(columns %in% names(reference)), reference,
-    "NULL, or a data frame with the columns env_id, low and high", "reference", call
-  )
+  if (!is.null(reference) && !(is.data.frame(reference) && all(columns %in% names(reference)))) {
+    must <- "NULL, or a data frame with the columns env_id, low and high"
+    abort_argument(reference, must, "reference", call)
+  }
   check_count(reps)
   check_seed(seed)
   check_level(level)
@@ -158,7 +158,7 @@ check_are_trainings <- function(given, call) {
     "...", wrong[[1L]], call,
     '{if (nzchar(name)) paste0("`", name, "`") else "Each argument"} must be a training, not
      {describe_argument(wrong[[1L]])}.',
-    i = if (nzchar(name)) "{did_you_mean(name, choices)}",
+    i = if (nzchar(name)) did_you_mean(name, choices),
     i = if (inherits(wrong[[1L]], "gym_sweep")) "`sweep$comparison` compares its settings.",
     i = if (several) "`do.call(compare_trainings, x)` compares the trainings of a list."
   )

@@ -141,7 +141,7 @@ read_logs <- function(paths, call, read = function(path) path_curves(path, call)
     damaged <- function(cnd) {
       tryCatch(
         abort_wrong(
-          "...", path, call, 'The log "{path}" is damaged.', x = "{conditionMessage(cnd)}"
+          "...", path, call, 'The log "{path}" is damaged.', x = conditionMessage(cnd)
         ),
         error = identity
       )

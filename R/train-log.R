@@ -66,7 +66,7 @@ training_log <- function(folder, settings, state, call) {
   fail <- function(cnd) {
     abort_wrong(
       "log", folder, call, 'The log cannot be written to "{folder}".',
-      x = "{conditionMessage(cnd)}", i = "Give another folder as `log`."
+      x = conditionMessage(cnd), i = "Give another folder as `log`."
     )
   }
   tryCatch(

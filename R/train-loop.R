@@ -147,7 +147,7 @@ enter_iteration <- function(state, settings, agent, results, steps, episodes = N
     )
     episodes$candidate <- episodes$candidate + state$iteration
   } else {
-    elapsed <- proc.time()[["elapsed"]] - state$started
+    elapsed <- now() - state$started
     row <- history_row(
       state$iteration + 1L, state$steps + sum(steps), results$returns, results$lengths, elapsed
     )
@@ -224,7 +224,7 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
   bar <- progress_bar(total, unit, shown = progress, frame = frame)
   # A script has no bar: after a while it says once how long the training may take.
   told <- begun <- progress
-  started <- proc.time()[["elapsed"]]
+  started <- now()
   before <- if (by_steps) state$steps else state$iteration
   show <- function(episodes = 0) {
     finished <- if (by_steps) {
@@ -238,7 +238,7 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
     } else {
       iteration_note(state)
     })
-    elapsed <- proc.time()[["elapsed"]] - started
+    elapsed <- now() - started
     told <<- told || inform_of_pace(finished - before, total - before, unit, elapsed)
   }
   state$report <- if (settings$search) {
@@ -246,7 +246,7 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
   } else {
     function(episodes) {
       # The first iteration may be long.
-      elapsed <- proc.time()[["elapsed"]] - started
+      elapsed <- now() - started
       if (!begun && state$iteration == 0L) begun <<- inform_of_start(episodes, elapsed)
     }
   }

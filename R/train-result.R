@@ -30,7 +30,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
         kwargs = settings$kwargs,
         seed = settings$seed,
         steps = state$steps,
-        elapsed = proc.time()[["elapsed"]] - state$started,
+        elapsed = now() - state$started,
         interrupted = interrupted,
         max_steps = settings$max_steps,
         rules = settings[c(kept_rules, "eval_steps")],
@@ -217,7 +217,9 @@ provenance.default <- function(x, ...) {
 provenance.character <- function(x, ...) {
   call <- rlang::current_env()
   check_string(x)
-  check_that(file.exists(x), x, "a file that exists, or a result of this package", "x", call)
+  if (!file.exists(x)) {
+    abort_argument(x, "a file that exists, or a result of this package", "x", call)
+  }
   saved <- read_checkpoint(x, call)
   kept <- saved$provenance
   kept$seed <- saved$seed

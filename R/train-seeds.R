@@ -18,7 +18,7 @@ check_training_seeds <- function(seeds, seed, call) {
 #' @return As [gym_trainings].
 #' @noRd
 train_seeds <- function(in_env, settings, seeds, files, progress, client, call) {
-  started <- proc.time()[["elapsed"]]
+  started <- now()
   runs <- lapply(seeds, function(seed) run_of_seed(settings, seed, files, call))
   kept <- sum(!vapply(runs, function(run) is.null(run$file$saved), NA))
   if (kept > 0L) {
@@ -27,7 +27,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   show <- progress_bar(length(seeds), "Seed", "0 reached the target, ", shown = progress)
   trainings <- list()
   result <- function(interrupted = FALSE) {
-    new_trainings(trainings, settings, proc.time()[["elapsed"]] - started, interrupted)
+    new_trainings(trainings, settings, now() - started, interrupted)
   }
   keep <- function(training) {
     trainings[[length(trainings) + 1L]] <<- training

@@ -8,9 +8,6 @@ check_given <- function(x, hint = NULL, arg = rlang::caller_arg(x), call = rlang
   }
 }
 
-# For conditions of one place; `must` says what the argument must be.
-check_that <- function(good, x, must, arg, call) if (!good) abort_argument(x, must, arg, call)
-
 check_count <- function(x, min = 1, max = .Machine$integer.max, allow_null = FALSE,
                         arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   check_number(x, min, max, allow_null, arg, call, whole = TRUE)

@@ -96,7 +96,7 @@ few_names <- function(names) {
          if (n > 12L) paste0(", ..., `", names[[n]], "`"))
 }
 
-# Prints an object that format() describes in one line.
+# Prints an object by what format() returns.
 print_line <- function(x) print_lines(x, format(x))
 
 print_lines <- function(x, lines) {
