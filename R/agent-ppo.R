@@ -248,7 +248,7 @@ ppo_forward <- function(policy, value, weights, inputs, action) {
 #' @export
 format.gym_agent_ppo <- function(x, ...) {
   agent_text("PPO", x[c("batch_steps", "batch", "epochs", "learning_rate", "gamma", "lambda",
-                           "clip")])
+                        "clip")])
 }
 
 #' @rdname agent_ppo

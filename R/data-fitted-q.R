@@ -109,7 +109,9 @@ fit_rule <- function(steps, recipe, call) {
   }
   prepared <- prepare_steps(steps, regression, recipe$stages)
   prepared <- weigh_steps(prepared, rep(1, length(steps$step)))
+  # A sweep needs the values of all states, other updates those of each step's next state.
   sweep <- if (recipe$table && !recipe$double) table_sweep(prepared, regression, recipe$discount)
+  after <- if (is.null(sweep)) prepared$after else seq_len(nrow(regression$states))
   fits <- iterate_fits(
     function(fit, step, ahead) {
       if (recipe$double) {
@@ -117,10 +119,10 @@ fit_rule <- function(steps, recipe, call) {
       } else if (is.null(sweep) || is.null(ahead)) {
         fit_targets(prepared, regression, ahead, step, recipe$discount)
       } else {
-        sweep(fit)
+        sweep(fit, ahead)
       }
     },
-    function(fit, step) best_next_values(regression, fit, prepared$after),
+    function(fit, step) best_next_values(regression, fit, after),
     recipe$horizon, recipe$iterations
   )
   new_rule(regression, fits, steps, recipe)
@@ -230,10 +232,9 @@ table_sweep <- function(prepared, regression, discount) {
     i = from[goes_on], j = prepared$after[used][goes_on], x = discount * share[goes_on],
     dims = c(length(own), states)
   )
-  function(fit) {
-    values <- reward + times(moves, best_next_values(regression, fit, seq_len(states)))
+  function(fit, ahead) {
     fit[] <- NA
-    fit[own] <- values
+    fit[own] <- reward + times(moves, ahead)
     fit
   }
 }

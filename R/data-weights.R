@@ -16,11 +16,9 @@ estimate_methods <- function(design, method) {
   }
   estimates <- if (length(weighted)) weighted_estimates(parts, design$stratum, once, weighted)[1L, ]
   if (length(weighted) == 1L) names(estimates) <- weighted
-  if ("fqe" %in% method) {
-    fitting <- prepare_fqe(design)
+  fitting <- if ("fqe" %in% method) prepare_fqe(design)
+  if (!is.null(fitting)) {
     estimates <- c(fqe = fitted_value(design, fitting, once[, 1L]), estimates)
-  } else {
-    fitting <- NULL
   }
   list(parts = parts, fitting = fitting, estimates = estimates[method])
 }

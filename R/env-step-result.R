@@ -190,14 +190,10 @@ wrong_parts <- function(out, n, finite = FALSE) {
 is_flags <- function(x, n) is.logical(x) && length(x) == n && !anyNA(x)
 
 abort_step <- function(problem, out, call) {
-  gym_abort(
-    c(
-      paste0(problem, "."),
-      i = paste("It must be a list of `observation`, `reward`, `terminated` (the episode ended by",
-                "the environment's own rules) and `truncated` (it was cut off, such as by a limit",
-                "of steps).")
-    ),
-    class = "gym_error_argument", argument = "env", value = out, call = call
+  abort_wrong(
+    "env", out, call, "{problem}.",
+    i = "It must be a list of `observation`, `reward`, `terminated` (the episode ended by the
+         environment's own rules) and `truncated` (it was cut off, such as by a limit of steps)."
   )
 }
 

@@ -32,17 +32,12 @@ as_token <- function(token, call = rlang::caller_env()) {
     return(NULL)
   }
   token <- if (rlang::is_string(token)) trimws(token)
-  # Other characters could end the header or start another one.
-  if (is.null(token) || !grepl("^[!-~]+$", token)) {
-    gym_abort(
-      c(
-        "`token` must be one string of visible ASCII characters.",
-        i = paste0("Without `token` it is what the environment variable ", token_variable,
-                   " holds.")
-      ),
-      class = "gym_error_argument", argument = "token", call = call
-    )
-  }
+  # Other characters could end the header or start another one. The error must not have the token.
+  abort_if(
+    is.null(token) || !grepl("^[!-~]+$", token), "token", NULL, call,
+    "`token` must be one string of visible ASCII characters.",
+    i = "Without `token` it is what the environment variable {token_variable} holds."
+  )
   hide_token(token)
   new_token(token)
 }

@@ -47,13 +47,10 @@ play_apart <- function(vector_env, history, policy_of, report, max_steps, keep_s
 }
 
 check_plays_apart <- function(policy, vector_env) {
-  if (plays_apart(policy)) {
-    return()
-  }
-  gym_abort(
-    c(paste0("A policy that plays in a process of its own cannot be played together with ",
-             policy_text(policy), "."),
-      i = "Play each in a call of its own, with the same `seed`."),
-    class = "gym_error_argument", argument = "policy", call = vector_env$call
+  abort_if(
+    !plays_apart(policy), "policy", NULL, vector_env$call,
+    "A policy that plays in a process of its own cannot be played together with
+     {policy_text(policy)}.",
+    i = "Play each in a call of its own, with the same `seed`."
   )
 }

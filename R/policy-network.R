@@ -119,9 +119,10 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   last <- if (identical(output, "greedy")) "logistic" else "identity"
   activation <- layer_activations(activation %||% c("tanh", last), sizes)
   last <- activation[[length(activation)]]
+  call <- rlang::current_env()
   abort_if(
     !identical(output, "greedy") && last != "identity",
-    "activation", activation, rlang::current_env(),
+    "activation", activation, call,
     'A network that draws its actions needs outputs of "identity", not of "{last}".',
     i = '`activation = c("tanh", "identity")` has them.'
   )
@@ -132,7 +133,7 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   log_std <- plain_numbers(log_std)
   if (!is.numeric(log_std) || !length(log_std) || !all(is.finite(log_std))) {
     must <- "a finite number, or one for each output"
-    abort_argument(log_std, must, "log_std", rlang::current_env())
+    abort_argument(log_std, must, "log_std", call)
   }
   policy$log_std <- as.numeric(log_std)
   policy$epsilon <- epsilon
@@ -141,7 +142,7 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   weights <- plain_numbers(weights)
   if (!is.null(weights)) {
     abort_if(
-      anyNA(sizes), "sizes", sizes, rlang::current_env(),
+      anyNA(sizes), "sizes", sizes, call,
       "`weights` are for given sizes, and `sizes` leaves some to the environment.",
       i = "Give all sizes as numbers."
     )

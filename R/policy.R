@@ -73,9 +73,9 @@ act <- function(policy, observation, ...) UseMethod("act")
 #' @export
 act.default <- function(policy, observation, ...) {
   check_policy(policy)
-  gym_abort(
-    paste0("There is no method of `act()` for a policy of class ", class(policy)[[1L]], "."),
-    class = "gym_error_argument"
+  abort_wrong(
+    "policy", policy, rlang::current_env(),
+    "There is no method of `act()` for a policy of class {class(policy)[[1L]]}."
   )
 }
 

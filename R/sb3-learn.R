@@ -176,13 +176,12 @@ check_sb3_env <- function(env, call) {
   if (rlang::is_string(env) && is_made_by_server(env)) {
     return()
   }
-  text <- if (rlang::is_string(env)) "an environment in R" else describe_argument(env)
-  gym_abort(
-    c(paste0("Stable-Baselines3 trains in environments that Python makes from an id, not in ",
-             text, "."),
-      i = paste("`learn_ppo()` trains in environments written in R, and with wrappers that are R",
-                "functions. The arguments of an id go into `env_kwargs`.")),
-    class = "gym_error_argument", argument = "env", value = env, call = call
+  abort_wrong(
+    "env", env, call,
+    'Stable-Baselines3 trains in environments that Python makes from an id, not in
+     {if (rlang::is_string(env)) "an environment in R" else describe_argument(env)}.',
+    i = "`learn_ppo()` trains in environments written in R, and with wrappers that are R functions.
+         The arguments of an id go into `env_kwargs`."
   )
 }
 
@@ -211,10 +210,10 @@ with_sb3_preset <- function(settings) {
 
 check_sb3_settings <- function(settings, call) {
   of <- function(check, name, ...) check(settings[[name]], ..., arg = name, call = call)
-  if (is.null(settings$total_steps)) {
-    gym_abort("Training needs a budget: give `total_steps` of the environment.",
-              class = "gym_error_argument", argument = "total_steps", call = call)
-  }
+  abort_if(
+    is.null(settings$total_steps), "total_steps", NULL, call,
+    "Training needs a budget: give `total_steps` of the environment."
+  )
   for (name in c("total_steps", "num_envs", "eval_every")) of(check_count, name)
   of(check_count, "eval_episodes_curve", min = 0)
   of(check_count, "eval_episodes", min = 2)

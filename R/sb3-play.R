@@ -27,15 +27,12 @@ policy_bind.gym_policy_sb3 <- function(policy, env, call = rlang::caller_env()) 
   if (is.null(made_of) && !is.null(policy$env)) {
     return(policy)
   }
-  if (is.null(made_of) || !is_made_by_server(made_of$env) || calls_r(made_of$env)) {
-    gym_abort(
-      c(paste("A policy of Stable-Baselines3 plays in a Python process, which makes the",
-              "environment itself."),
-        i = paste("Give the environment's id and its arguments, without wrappers that are R",
-                  "functions.")),
-      class = "gym_error_argument", argument = "env", value = made_of$env, call = call
-    )
-  }
+  abort_if(
+    is.null(made_of) || !is_made_by_server(made_of$env) || calls_r(made_of$env),
+    "env", made_of$env, call,
+    "A policy of Stable-Baselines3 plays in a Python process, which makes the environment itself.",
+    i = "Give the environment's id and its arguments, without wrappers that are R functions."
+  )
   policy$env <- made_of$env
   own <- setdiff(names(made_of$arguments), c("num_envs", "num_workers", "frames"))
   policy$kwargs <- made_of$arguments[own]

@@ -62,15 +62,12 @@ as_policy.character <- function(x, ..., activation = NULL, moments = NULL) {
 }
 
 check_no_pickle <- function(x, call) {
-  if (!grepl("[.](pkl|pickle|pt|pth)$", tolower(x))) {
-    return()
-  }
-  gym_abort(
-    c(paste0("\"", basename(x), "\" is a pickle, and is not loaded."),
-      x = paste("A pickle from elsewhere can run any program with your rights: read your files,",
-                "delete them, send them away."),
-      i = "`as_policy()` reads the zip file that `model.save()` makes, by its weights alone."),
-    class = "gym_error_argument", argument = "x", value = x, call = call
+  abort_if(
+    grepl("[.](pkl|pickle|pt|pth)$", tolower(x)),
+    "x", x, call, '"{basename(x)}" is a pickle, and is not loaded.',
+    x = "A pickle from elsewhere can run any program with your rights: read your files, delete them,
+         send them away.",
+    i = "`as_policy()` reads the zip file that `model.save()` makes, by its weights alone."
   )
 }
 
@@ -78,17 +75,15 @@ check_moments <- function(moments, x, call) {
   if (is.null(moments)) {
     name <- sub("[.]zip$", "", basename(x))
     beside <- file.path(dirname(x), c("vecnormalize.pkl", file.path(name, "vecnormalize.pkl")))
-    if (any(file.exists(beside))) {
-      gym_abort(
-        c(paste0("This policy's observations were normalised: there is ",
-                 beside[file.exists(beside)][[1L]], "."),
-          i = paste("That file is a pickle, which can run any program, and is not loaded. Give",
-                    "`moments = list(mean = , variance = )`: in Python they are `obs_rms.mean`",
-                    "and `obs_rms.var` of the VecNormalize."),
-          i = "`moments = FALSE` takes the policy without."),
-        class = "gym_error_argument", argument = "moments", call = call
-      )
-    }
+    abort_if(
+      any(file.exists(beside)), "moments", NULL, call,
+      "This policy's observations were normalised: there is
+       {beside[file.exists(beside)][[1L]]}.",
+      i = "That file is a pickle, which can run any program, and is not loaded. Give `moments =
+           list(mean = , variance = )`: in Python they are `obs_rms.mean` and `obs_rms.var` of the
+           VecNormalize.",
+      i = "`moments = FALSE` takes the policy without."
+    )
     return()
   }
   if (isFALSE(moments)) {
