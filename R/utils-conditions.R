@@ -36,7 +36,9 @@ abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument"
     } else if (is.call(part) && identical(part[[1L]], quote(`{`))) {
       fill(part[[length(part)]])
     } else if (is.character(part)) {
-      as.character(cli::pluralize(gsub("\\s*\n\\s*", " ", part), .envir = frame))
+      # pluralize() needs glue, which cli only suggests.
+      text <- gsub("\\s*\n\\s*", " ", part)
+      as.character(cli::pluralize(text, .envir = frame, .transformer = glue::identity_transformer))
     } else {
       eval(part, frame)
     }
