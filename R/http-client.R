@@ -61,8 +61,6 @@ client_state <- function(client) {
       state$home <- new.env(parent = emptyenv())
       state$session_config <- getOption("httr_config")
       state$instances <- new.env(parent = emptyenv())
-      state$creation_keys <- new_idempotency_keys()
-      state$server <- NULL
       state$to_close <- character()
       state$health <- NULL
       # The process in which the client was first used.

@@ -1,58 +1,20 @@
 # The instances that this session has created on servers. An instance is closed when it is no longer
-# used: after garbage collection of its object, after an interrupt of the call that created it, and
-# at the end of the session.
+# used: after garbage collection of its object, if the call that makes it fails after the server's
+# answer, and at the end of the session.
 
 # The time for closing in total, in seconds, if nobody waits for it.
 closing_time <- 2
 
-#' Create an instance on the server and remember it
-#'
-#' An instance may be created although its answer is lost. Nobody then knows its id. Creations
-#' therefore have their own idempotency keys:
-#'
-#' 1. The request is remembered with its key and body before it is sent.
-#' 2. The server creates the instance; an interrupt or a lost connection comes before the answer.
-#' 3. `outcome` is still "lost": the request is queued for closing, see [end_creation()].
-#' 4. When the next instance is created or reset, when instances are listed, or at the end of the
-#' session, the request is repeated. The server does not create another instance; it answers with
-#' the id, and the instance is closed. If it has ended since, another server refuses the request.
-#' @return The answer, with a checked id.
-#' @noRd
+# Creates an instance on the server and remembers it. Returns the answer, with a checked id.
 create_on_server <- function(client, fields, call) {
-  state <- client_state(client)
-  tryCatch(
-    create_once(client, state, fields, call),
-    gym_error_http = function(cnd) {
-      if (!identical(cnd$code, "server_restarted")) rlang::cnd_signal(cnd)
-      # Another server listens at the address now. It has created nothing.
-      state$server <- NULL
-      create_once(client, state, fields, call)
-    }
-  )
-}
-
-create_once <- function(client, state, fields, call) {
-  # A server that was started later must not create what an earlier one was asked for.
-  key <- c(next_key(state$creation_keys), server = state$server)
-  place <- paste(key$key, key$number)
-  outcome <- "lost"
-  on.exit(end_creation(state, place, outcome))
-  body <- json_body(fields, key)
-  remember_instance(place, client, body = body)
-  answer <- withCallingHandlers(
-    post_answer(client, "/v1/envs/", body = body, repeatable = TRUE, call = call),
-    gym_error_http = function(cnd) outcome <<- "refused",
-    gym_error_connection = function(cnd) if (isFALSE(cnd$reached)) outcome <<- "unsent"
-  )
-  check_instance_id(answer$instance_id)
+  key <- next_key(client_state(client)$keys)
+  # An interrupt after the answer must not come before the instance is remembered.
   suspendInterrupts({
-    # Says by a text which server it is.
-    state$server <- string_or_null(answer$server)
+    answer <- allowInterrupts(post_answer(client, "/v1/envs/", fields, key, call = call))
+    check_instance_id(answer$instance_id)
     remember_instance(
-      instance_place(client, answer$instance_id), client, answer$instance_id,
-      env_id = shown_line(answer$env_id), server = state$server
+      client, answer$instance_id, shown_line(answer$env_id), string_or_null(answer$server)
     )
-    outcome <- "created"
   })
   answer
 }
@@ -61,31 +23,13 @@ instance_route <- function(instance_id) {
   paste0("/v1/envs/", curl::curl_escape(instance_id), "/")
 }
 
-# A creation whose answer was lost is repeated before the next one, to learn the instance's id and
-# close it. Until then no other request may use the same text in its key, because the server
-# remembers only the last number of each text.
-end_creation <- function(state, place, outcome) {
-  if (outcome == "lost") {
-    state$creation_keys <- new_idempotency_keys()
-    state$to_close <- c(state$to_close, place)
-  } else {
-    forget_instance(place)
-  }
-}
-
-# The place of an instance in `the_session$instances`. A creation without an answer is stored under
-# its idempotency key.
+# The place of an instance in `the_session$instances`.
 instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
 
-# `body` is that of a creation that has no answer yet, and `server` the text by which the server
-# says which one it is.
-remember_instance <- function(place, client, instance_id = NULL, body = NULL, env_id = NULL,
-                              server = NULL) {
-  assign(
-    place,
-    list(client = client, pid = Sys.getpid(), instance_id = instance_id, body = body,
-         env_id = env_id, server = server),
-    envir = the_session$instances
+# `server` is the text by which the server says which one it is.
+remember_instance <- function(client, instance_id, env_id = NULL, server = NULL) {
+  the_session$instances[[instance_place(client, instance_id)]] <- list(
+    client = client, pid = Sys.getpid(), instance_id = instance_id, env_id = env_id, server = server
   )
 }
 
@@ -213,37 +157,17 @@ close_together <- function(places, seconds) {
   pool <- curl::new_pool()
   on.exit(lapply(curl::multi_list(pool), curl::multi_cancel))
   deadline <- now() + seconds
-  post <- function(entry, route, body, done) {
+  for (place in places) local({
+    entry <- the_session$instances[[place]]
     left <- max(1, (deadline - now()) * 1000)
     line <- new_line(entry$client)
     curl::handle_setopt(line$handle, timeout_ms = left, connecttimeout_ms = left)
-    set_line(line, "POST", body, json_type, json_type)
-    start_request(line, paste0(entry$client$remote_base, route), pool, function(response) {
-      if (!inherits(response, "error")) done(response)
+    set_line(line, "POST", json_body(NULL), json_type, json_type)
+    url <- paste0(entry$client$remote_base, instance_route(entry$instance_id), "close/")
+    start_request(line, url, pool, function(response) {
+      if (!inherits(response, "error")) forget_instance(place)
     })
-  }
-  close_place <- function(place) {
-    entry <- the_session$instances[[place]]
-    route <- paste0(instance_route(entry$instance_id), "close/")
-    post(entry, route, json_body(NULL), function(response) forget_instance(place))
-  }
-  ask_for_id <- function(place) {
-    entry <- the_session$instances[[place]]
-    post(entry, "/v1/envs/", entry$body, function(response) {
-      instance_id <- tryCatch(
-        string_or_null(parsed_body(response)$instance_id), error = function(cnd) NULL
-      )
-      forget_instance(place)
-      if (!is.null(instance_id)) {
-        known <- instance_place(entry$client, instance_id)
-        remember_instance(known, entry$client, instance_id)
-        close_place(known)
-      }
-    })
-  }
-  for (place in places) {
-    if (is.null(the_session$instances[[place]]$body)) close_place(place) else ask_for_id(place)
-  }
+  })
   curl::multi_run(timeout = seconds, pool = pool)
   invisible()
 }

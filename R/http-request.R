@@ -71,9 +71,7 @@ json_body <- function(fields, key = NULL) {
 
 key_json <- function(key) {
   if (!is.null(key)) {
-    # The server that it is for, if that matters.
-    server <- if (!is.null(key$server)) paste0(',"server":', json_string(key$server))
-    sprintf('{"key":"%s","number":%.0f%s}', key$key, key$number, server %||% "")
+    sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
   }
 }
 

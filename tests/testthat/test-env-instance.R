@@ -71,8 +71,7 @@ test_that("an error names what may be lost on a server of somebody else", {
   # As if another session had started it.
   the_session$servers[[base]] <- NULL
   stop_server(own)
-  remember_instance(instance_place(server, env$instance_id), server, env$instance_id,
-                    env_id = "CartPole-v1")
+  remember_instance(server, env$instance_id, "CartPole-v1")
   cnd <- expect_error(env_list(server), class = "gym_error_connection")
   text <- paste0("If it has ended, these are lost: `CartPole-v1 (", env$instance_id, ")`.")
   expect_match(conditionMessage(cnd), text, fixed = TRUE)

@@ -58,8 +58,7 @@ test_that("a session ends at once with a server behind a broken connection, and 
   full <- create_GymClient(local_stalling("full"))
   run <- run_session(
     full,
-    "gym:::remember_instance('there', server, 'abcdef01')",
-    "gym:::remember_instance('unanswered', server, body = charToRaw('{}'))",
+    "gym:::remember_instance(server, 'abcdef01')",
     "own <- gym_server_start()",
     "pid <- gym:::the_session$servers[[1]]$pid",
     "tools::pskill(pid, tools::SIGSTOP)",
@@ -125,40 +124,6 @@ test_that("an environment that was closed is not closed again", {
   expect_false(instance_place(server, gone$instance_id) %in% ls(the_session$instances))
 })
 
-test_that("an interrupted gym_make() leaves nothing, whenever the interrupt comes", {
-  skip_unless_all()
-  skip_on_os("windows")
-  server <- local_odd_server()
-  run <- run_session(
-    server,
-    # A connection and what is made at the first call are there already.
-    "env_close(server, env_create(server, 'CartPole-v1'))",
-    "said <- tryCatch({",
-    "  system(paste('(sleep 0.5; kill -INT', Sys.getpid(), ') &'))",
-    "  gym_make('odd_environments:SlowToMake-v0', client = server)",
-    "}, interrupt = function(cnd) 'interrupted')",
-    "cat(said, length(ls(gym:::the_session$instances)), '')",
-    # It is not made yet when it is first asked for.
-    "for (i in 1:20) {",
-    "  Sys.sleep(2)",
-    "  left <- c(length(env_list_all(server)), length(ls(gym:::the_session$instances)))",
-    "  if (!any(left)) break",
-    "}",
-    "cat(left)"
-  )
-  expect_identical(run$stdout, "interrupted 1 0 0")
-  # And at the session's end, of one that is long made by then.
-  run <- run_session(
-    server,
-    "hasty <- create_GymClient(server$remote_base, timeout = 0.5)",
-    "try(gym_make('odd_environments:SlowToMake-v0', client = hasty), silent = TRUE)",
-    "Sys.sleep(2.5)",
-    "cat(length(env_list_all(server)))"
-  )
-  expect_identical(run$stdout, "1")
-  expect_length(open_after_a_while(server), 0)
-})
-
 test_that("what was refused or never sent is not remembered", {
   remembered <- function() length(ls(the_session$instances))
   before <- remembered()
@@ -202,17 +167,10 @@ test_that("a client goes on with a server that was started later at its address"
   first <- local_server(token = FALSE)
   client <- create_GymClient(first$remote_base)
   expect_type(env_create(client, "CartPole-v1"), "character")
-  known <- client_state(client)$server
   port <- as.integer(sub(".*:", "", first$remote_base))
   gym_server_stop(first)
   later <- local_server(port = port, token = FALSE)
   id <- env_create(client, "CartPole-v1")
-  expect_named(env_list_all(later), id)
-  expect_false(identical(client_state(client)$server, known))
-  # What the first one was asked for is not made again.
-  fields <- c(env_id = "\"CartPole-v1\"")
-  key <- list(key = "k", number = 1, server = known)
-  expect_error(post_answer(client, "/v1/envs/", fields, key), class = "gym_error_http_410")
   expect_named(env_list_all(later), id)
 })
 

@@ -22,7 +22,6 @@ _STATUS = {
     "method_not_allowed": 405,
     "request_conflict": 409,
     "instance_idle_closed": 410,
-    "server_restarted": 410,
     "upload_closed": 410,
     "body_too_large": 413,
     "upgrade_required": 426,

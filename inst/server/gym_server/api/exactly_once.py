@@ -73,7 +73,7 @@ class ExactlyOnce:
         # Guards what follows; never held while waiting for a row's lock.
         self._lock = threading.Lock()
         self._rows: dict[str, dict[str, _Row]] = {}
-        self._unordered: dict[tuple[str, int], _Row] = {}
+        self._unordered: dict[RequestId, _Row] = {}
         self._forgotten: dict[str, int] = {}
         # The bytes of the rows that have a response, in the order of the responses.
         self._sizes: dict[_Row, int] = {}
@@ -99,11 +99,9 @@ class ExactlyOnce:
 
         Raises:
             GymServerError: ``request_conflict`` if the number was used for another request, is
-                smaller than the newest, or its response was dropped; ``server_restarted``.
+                smaller than the newest, or its response was dropped.
         """
-        key, number, start = request_id
-        if start is not None and start != START:
-            raise _restarted(request_id)
+        key, number = request_id
         if instance_id is not None and not self._lives(instance_id):
             # No request to it was done, or none matters any more.
             return act()[0]
@@ -125,16 +123,18 @@ class ExactlyOnce:
 
     def _unordered_row(self, request_id: RequestId) -> _Row:
         """Return the row of a request that creates or closes an instance."""
-        key, number, _ = request_id
-        row = self._unordered.get((key, number))
+        key, number = request_id
+        row = self._unordered.get(request_id)
         if row is None:
             if number <= self._forgotten.get(key, -1):
                 raise _conflict(request_id, "came after many others")
-            row = self._unordered[key, number] = _Row()
+            row = self._unordered[request_id] = _Row()
             if len(self._unordered) > self._most_unordered:
-                key, number = next(iter(self._unordered))
-                self._drop(self._unordered.pop((key, number)))
-                self._forgotten[key] = max(number, self._forgotten.get(key, -1))
+                oldest = next(iter(self._unordered))
+                self._drop(self._unordered.pop(oldest))
+                self._forgotten[oldest.key] = max(
+                    oldest.number, self._forgotten.get(oldest.key, -1)
+                )
         return row
 
     def _count(self, row: _Row, size: int) -> None:
@@ -180,13 +180,4 @@ def _conflict(request_id: RequestId, reason: str) -> GymServerError:
         "request_conflict",
         f"Request number {request_id.number} of key '{request_id.key}' {reason}; nothing was done",
         "number the requests of a key upwards, and give each copy of a client its own key",
-    )
-
-
-def _restarted(request_id: RequestId) -> GymServerError:
-    return GymServerError(
-        "server_restarted",
-        f"Request number {request_id.number} of key '{request_id.key}' was meant for a server that "
-        "has ended, with all its environments; nothing was done",
-        "create the environments again",
     )

@@ -89,7 +89,7 @@ def response_to(
         content_type = COLUMN_TENSORS if observation.by_column else TENSORS
         return Response(status, _dumps_tensors(request_id, **result), content_type)
     if request_id is not None:
-        result = {**result, "request": request_id.echo()}
+        result = {**result, "request": request_id._asdict()}
     return Response(status, dumps(result))
 
 

@@ -106,16 +106,10 @@ class RequestId(NamedTuple):
     Attributes:
         key: the client's own key, 1 to 64 characters.
         number: grows with each request.
-        server: the server that it is meant for, by the text that it gave; None for any.
     """
 
     key: str
     number: int
-    server: str | None = None
-
-    def echo(self) -> dict:
-        """Return what a response has of it."""
-        return {"key": self.key, "number": self.number}
 
 
 _KEY = re.compile("[!-~]{1,64}")
@@ -131,10 +125,7 @@ def _key(value: object) -> str:
 def _request_id(value: object) -> RequestId:
     if not isinstance(value, dict):
         raise ValueError
-    server = value.get("server")
-    if server is not None and not isinstance(server, str):
-        raise ValueError
-    return RequestId(_key(value.get("key")), integer(value.get("number")), server)
+    return RequestId(_key(value.get("key")), integer(value.get("number")))
 
 
 ANYTHING = Kind("any JSON value", lambda value: value, empty_is_absent=False)

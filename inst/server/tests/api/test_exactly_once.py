@@ -2,7 +2,6 @@ import threading
 
 import pytest
 
-from gym_server.api import exactly_once
 from gym_server.api.exactly_once import ExactlyOnce
 from gym_server.errors import GymServerError
 from gym_server.protocol.fields import RequestId
@@ -195,13 +194,3 @@ def test_what_all_keep_together_is_bounded_and_nothing_is_done_again():
     assert once.answer(RequestId("a", 3), "", lambda: outcome("huge", size=321), "i") == "huge"
     assert conflict(once, RequestId("a", 3), "", act, "i")
     assert once._bytes == 0
-
-
-def test_a_key_of_a_server_that_has_ended_is_refused():
-    once, act = Once(), Counter()
-    for instance_id in ("i", None):
-        assert once.answer(RequestId("a", 1, exactly_once.START), "", act, instance_id)
-        with pytest.raises(GymServerError) as refusal:
-            once.answer(RequestId("a", 2, "another"), "", act, instance_id)
-        assert refusal.value.code == "server_restarted"
-    assert act.calls == 2
