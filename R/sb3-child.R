@@ -88,12 +88,10 @@ end_child <- function(process) {
 }
 
 abort_child <- function(process, log, call) {
-  status <- process$get_exit_status()
-  lines <- log_tail(log, 5L)
+  less <- "a smaller `buffer_size`, `batch_size` or `num_envs` takes less."
   gym_abort(
     c("The process of Stable-Baselines3 ended without a result.",
-      x = if (identical(status, -9L)) "It was killed, as systems do when memory runs out.",
-      x = if (length(lines)) paste(lines, collapse = "\n"),
+      x = end_reason(process, log, less),
       i = "With a `checkpoint` the same call goes on from the last evaluation."),
     class = "gym_error_training", call = call
   )

@@ -137,28 +137,32 @@ log_tail <- function(log, n = 20L) {
   utils::tail(if (file.exists(log)) readLines(log, warn = FALSE) else character(), n)
 }
 
-# Why a server has ended, in words; `NULL` if it was stopped. Its log has a line about that by the
-# server itself, or by Python if the server could not write it.
-end_reason <- function(process, log) {
+# Why a process has ended, in words; `NULL` if it was stopped. Its log has a line about that by the
+# server itself, or by Python if the server could not write it. `less` says what takes less memory.
+end_reason <- function(process, log, less = paste(
+  "fewer or smaller environments take less, and `gym_server_start(max_memory_mb = )` is the limit."
+)) {
   lines <- log_tail(log, 10000L)
   said <- grep(" CRITICAL ", lines, fixed = TRUE, value = TRUE)
   python <- grep("^(Timeout [(]|Fatal Python error)", lines, value = TRUE)
   status <- process$get_exit_status() %||% 0L
+  # On Windows a status below 0 has other meanings.
+  signal <- if (status < 0L && status > -65L) paste("signal", -status)
   if (length(said)) {
     sentence(sub("^.*? CRITICAL [^ ]+: ", "", utils::tail(said, 1L), perl = TRUE))
   } else if (length(python) && startsWith(python[[1L]], "Timeout")) {
     "C code held Python's lock for longer than the server's `max_call_seconds`."
   } else if (any(grepl("^[^ ]* ?terminat.*bad_alloc", lines))) {
     # C++ prints this and aborts.
-    paste("The system gave it no more memory: make fewer or smaller environments, or raise",
-          "`gym_server_start(max_memory_mb = )`.")
+    paste("The system gave it no more memory:", less)
   } else if (length(python)) {
-    python[[1L]]
+    crash <- c(sub("^Fatal Python error: ", "", python[[1L]]), signal)
+    paste0("It crashed: ", paste(crash, collapse = ", "), ".")
   } else if (status == -9L) {
-    paste("It was killed, as systems do when memory runs out;",
-          "`gym_server_start(max_memory_mb = )` limits it.")
+    paste("It was killed, as systems do when memory runs out:", less)
   } else if (status != 0L) {
-    paste(c(paste0("Its exit status is ", status, "."), utils::tail(lines, 3L)), collapse = "\n")
+    how <- if (is.null(signal)) "Its exit status is " else "It was ended by "
+    paste(c(paste0(how, signal %||% status, "."), utils::tail(lines, 3L)), collapse = "\n")
   }
 }
 

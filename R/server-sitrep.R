@@ -137,13 +137,12 @@ sitrep_own_servers <- function(named) {
   servers <- the_session$servers
   servers <- servers[!duplicated(vapply(servers, function(server) server$pid, 0L))]
   rows <- lapply(servers, function(server) {
-    status <- server$process$get_exit_status()
     own <- identical(server$url, the_session$client$remote_base)
     what <- paste0(server$url, if (own) " (this session's)")
     if (server$process$is_alive()) {
       sitrep_server(server$url, what, "gym_server_log()")
-    } else if (!identical(status, 0L)) {
-      finding("servers", what, paste("ended with status", status), if (own) "wrong" else "note",
+    } else if (!is.null(reason <- server$why_ended())) {
+      finding("servers", what, paste("has ended:", reason), if (own) "wrong" else "note",
               if (own) "gym_server_log()" else NA_character_)
     }
   })

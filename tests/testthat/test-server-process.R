@@ -8,7 +8,8 @@ test_that("the reason why a server has ended is found in its log", {
                    "step() of it took more than 3 s.")
   expect_match(reason(1L, "Timeout (0:00:04)!", "Thread 1"), "`max_call_seconds`", fixed = TRUE)
   expect_identical(reason(-11L, "Fatal Python error: Aborted", "", "Thread 1"),
-                   "Fatal Python error: Aborted")
+                   "It crashed: Aborted, signal 11.")
+  expect_identical(reason(-11L, "x"), "It was ended by signal 11.\nx")
   expect_match(reason(-9L, "x"), "max_memory_mb")
   expect_match(reason(-6L, "terminate called after throwing an instance of 'std::bad_alloc'",
                       "Fatal Python error: Aborted"), "max_memory_mb")

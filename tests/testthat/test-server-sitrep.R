@@ -112,7 +112,7 @@ test_that("the session's server is reported with its environments, also when it 
   the_session$servers[[other$remote_base]]$process$kill()
   local_session(servers = the_session$servers[other$remote_base], client = other)
   row <- server_row()
-  expect_match(row$finding, "ended with status")
+  expect_match(row$finding, "has ended: It was killed")
   expect_identical(row$state, "wrong")
   expect_identical(row$fix, "gym_server_log()")
 })

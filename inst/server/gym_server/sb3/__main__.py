@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import signal
@@ -22,6 +23,7 @@ def _await_end_of_input(stopping: threading.Event) -> None:
 
 def main(path: Path) -> None:
     """Run the job of a file, and write ``result.json`` beside it."""
+    faulthandler.enable()
     stopping = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stopping.set())
     threading.Thread(target=_await_end_of_input, args=[stopping], daemon=True).start()

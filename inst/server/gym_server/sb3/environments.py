@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 from typing import Any
 
 import gymnasium
@@ -17,6 +19,11 @@ from gym_server.envs.make import check_kwargs, find_spec, make_from_spec
 from gym_server.errors import GymServerError
 from gym_server.sb3.failures import JobError
 from gym_server.vector_envs.sub_env import ThisThread
+
+# PyTorch's optimizers import triton, if it is installed. Its copy of LLVM crashes if Mesa's, which
+# draws MuJoCo without a display, was loaded before (findings/mujoco-mesa-triton.sh).
+with contextlib.suppress(ImportError):
+    importlib.import_module("triton")
 
 # What an agent sees of an Atari game: pictures of this width, this many of them.
 _SCREEN, _STACK = 84, 4

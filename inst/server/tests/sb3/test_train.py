@@ -1,5 +1,8 @@
 """Trainings, which run in the process with PyTorch."""
 
+import json
+import subprocess
+import sys
 import threading
 from importlib.util import find_spec
 
@@ -94,6 +97,19 @@ def test_what_is_wrong_is_said_before_anything_is_trained(
     assert words in said["message"]
     assert said.get("argument") == argument
     assert not (tmp_path / "progress.csv").exists()
+
+
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="the extra mujoco is not installed")
+def test_a_robot_is_trained_by_the_program(tmp_path):
+    # A process of its own, which looks for a way to draw before PyTorch has an optimizer.
+    job = {**JOB, "task": "train", "env_id": "HalfCheetah-v5", "total_steps": 32}
+    path = tmp_path / "job.json"
+    path.write_text(json.dumps(job))
+    program = [sys.executable, "-m", "gym_server.sb3", str(path)]
+    # It ends when its input is closed.
+    with subprocess.Popen(program, stdin=subprocess.PIPE) as process:
+        assert process.wait() == 0
+    assert json.loads((tmp_path / "result.json").read_text())["steps"] == 32
 
 
 def test_a_loss_that_is_nan_ends_the_training_and_finite_weights_are_kept(tmp_path, child):
