@@ -20,7 +20,8 @@ check_package <- function(folder) {
   tarball <- build_tarball(folder)
   here <- setwd(folder)
   on.exit(setwd(here))
-  Sys.setenv("_R_CHECK_FORCE_SUGGESTS_" = "false")
+  # In .ci/run the tests share the cores: PyTorch's threads would wait for each other.
+  Sys.setenv("_R_CHECK_FORCE_SUGGESTS_" = "false", OMP_NUM_THREADS = "1")
   status <- r_cmd("check", "--no-manual", "--no-vignettes", tarball)
   log <- file.path("gym.Rcheck", "00check.log")
   bad <- inexcusable(log)

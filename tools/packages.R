@@ -92,7 +92,11 @@ mirror <- function(library, repository) {
   packages <- intersect(c(used, closure), rownames(available))
   packages <- packages[!dir.exists(file.path(library, packages))]
   if (length(packages) > 0) {
-    utils::install.packages(packages, lib = library, repos = url, Ncpus = 2)
+    # Only tests use this library.
+    utils::install.packages(
+      packages, lib = library, repos = url, Ncpus = 2,
+      INSTALL_opts = c("--no-help", "--no-test-load")
+    )
   }
   failed <- packages[!dir.exists(file.path(library, packages))]
   if (length(failed) > 0) stop("not installed: ", toString(failed), call. = FALSE)
