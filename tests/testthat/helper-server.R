@@ -45,13 +45,23 @@ local_env <- function(env_id = "CartPole-v1", ..., client = test_client(),
   env
 }
 
-# A server that can make the environments of odd_environments.py.
+# A server that can make the environments of odd_environments.py and mirror_environments.py: one of
+# its own for a test that stops it or needs other options, and one for all others of a process.
 local_odd_server <- function(..., frame = parent.frame()) {
-  withr::local_envvar(
-    PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
-  )
-  local_server(allow_module = "odd_environments", ..., frame = frame)
+  withr::local_envvar(PYTHONPATH = paste(
+    c(normalizePath(test_path()), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep
+  ))
+  modules <- c("odd_environments", "mirror_environments")
+  local_server(allow_module = modules, ..., frame = frame)
 }
+
+odd_server <- local({
+  server <- NULL
+  function() {
+    if (is.null(server)) server <<- local_odd_server(frame = testthat::teardown_env())
+    server
+  }
+})
 
 make_odd <- function(name, server) {
   gym_make(paste0("odd_environments:", name, "-v0"), client = server)

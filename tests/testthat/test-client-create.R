@@ -45,7 +45,7 @@ test_that("a server that stops in the middle is an error, one that is back is us
 
 test_that("an answer that does not come within the timeout is an error", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   patient <- make_odd("Slow", server)
   patient$reset()
   hasty <- create_GymClient(server$remote_base, timeout = 0.3)

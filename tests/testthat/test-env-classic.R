@@ -175,7 +175,7 @@ test_that("a step after the end warns once an episode", {
 
 test_that("an exception inside an environment is an error that leaves the others alone", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   env <- make_odd("Failing", server)
   other <- make_odd("Image", server)
   env$reset()
@@ -190,7 +190,7 @@ test_that("an exception inside an environment is an error that leaves the others
 })
 
 test_that("the info of an environment arrives", {
-  env <- make_odd("Telling", local_odd_server())
+  env <- make_odd("Telling", odd_server())
   env$reset()
   out <- env$step(0)
   expect_identical(out$reward, Inf)
@@ -215,7 +215,7 @@ test_that("uploading fails with the reason", {
 test_that("an interrupt during a call arrives as an interrupt", {
   skip_unless_all()
   skip_on_os("windows")
-  env <- make_odd("Slow", local_odd_server())
+  env <- make_odd("Slow", odd_server())
   env$reset()
   killer <- processx::process$new("sh", c("-c", paste("sleep 0.5; kill -INT", Sys.getpid())))
   outcome <- tryCatch(
@@ -233,7 +233,7 @@ test_that("an interrupt during a call arrives as an interrupt", {
 
 test_that("what an environment prints does not hold it up", {
   skip_unless_all()
-  env <- make_odd("Chatty", local_odd_server())
+  env <- make_odd("Chatty", odd_server())
   env$reset()
   for (i in 1:10) expect_equal(env$step(0)$reward, 1)
   expect_match(gym_server_log(env$client), "xxxx", all = FALSE)

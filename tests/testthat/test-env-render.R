@@ -57,7 +57,7 @@ test_that("a frame knows plot() and as.raster()", {
 
 test_that("grey and half transparent frames are shown, too", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   shades <- c("1" = "#0A0A0A", "3" = "#0A141E", "4" = "#0A141EFF")
   grounds <- c("1" = "#646464", "3" = "#646464", "4" = "#64646464")
   for (channels in c("1", "3", "4")) {
@@ -83,7 +83,7 @@ test_that("an environment that was not reset has no frame", {
 
 test_that("an environment that cannot be drawn says so", {
   skip_unless_all()
-  env <- make_odd("Image", local_odd_server())
+  env <- make_odd("Image", odd_server())
   env$reset()
   error <- expect_error(env$render(), class = "gym_error_http_400")
   expect_identical(error$code, "cannot_render")
@@ -157,7 +157,7 @@ test_that("frames print, and unpack when they are taken out", {
 test_that("grey and half transparent frames are kept as they are", {
   skip_unless_all()
   skip_if_not_installed("png")
-  server <- local_odd_server()
+  server <- odd_server()
   for (channels in c(1, 3, 4)) {
     env <- make_odd(paste0("Drawing", channels), server)
     frames <- rollout(env, policy_random(), frames = TRUE)$frames[[1]]
@@ -170,7 +170,7 @@ test_that("grey and half transparent frames are kept as they are", {
 
 test_that("an environment that cannot be drawn is refused before anything is played", {
   skip_unless_all()
-  env <- make_odd("Image", local_odd_server())
+  env <- make_odd("Image", odd_server())
   error <- expect_error(rollout(env, policy_random(), frames = TRUE), "Image-v0 cannot be drawn",
                         class = "gym_error_argument")
   expect_identical(error$argument, "frames")
@@ -213,5 +213,5 @@ test_that("an environment has its number of frames a second", {
   skip_unless_all()
   expect_identical(local_env("CartPole-v1")$spec$render_fps, 50L)
   expect_identical(local_env("CartPole-v1", num_envs = 2)$spec$render_fps, 50L)
-  expect_null(make_odd("Image", local_odd_server())$spec$render_fps)
+  expect_null(make_odd("Image", odd_server())$spec$render_fps)
 })

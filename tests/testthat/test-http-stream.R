@@ -106,7 +106,7 @@ test_that("a forked process and a copy from a file open streams of their own", {
 test_that("an interrupt of a step closes the stream, and the next step is the next", {
   skip_unless_all()
   skip_on_os("windows")
-  server <- local_odd_server()
+  server <- odd_server()
   env <- make_odd("Slow", server)
   env$reset()
   before <- connection_of(env)

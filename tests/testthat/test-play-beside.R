@@ -422,7 +422,7 @@ test_that("a search ends with the first round that reaches the target, and shows
 
 test_that("an environment that fails in the middle keeps the episodes that were finished", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   cnd <- expect_error(
     rollout("odd_environments:FailsLater-v0", policy_random(), 50, seed = 1, max_steps = 10,
             client = server),

@@ -1,12 +1,5 @@
 # Values from Python to R and back; see mirror_environments.py.
 
-local_mirror_server <- function(frame = parent.frame()) {
-  withr::local_envvar(
-    PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
-  )
-  local_server(allow_module = "mirror_environments", frame = frame)
-}
-
 # Sends back each value that a mirror shows. Returns the values and what the mirror
 # found different.
 play_mirror <- function(env, tensors) {
@@ -33,7 +26,7 @@ play_mirror <- function(env, tensors) {
 
 test_that("random values of random spaces come back to Python as they were", {
   skip_unless_all()
-  server <- local_mirror_server()
+  server <- odd_server()
   tried <- c(json = 0L, tensors = 0L)
   kinds <- character()
   problems <- character()

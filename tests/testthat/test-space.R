@@ -132,7 +132,7 @@ test_that("a Box of integers draws both its bounds", {
 })
 
 test_that("values of every sort arrive from a real server as Python had them", {
-  server <- local_odd_server()
+  server <- odd_server()
   expect_identical(
     make_odd("Image", server)$reset(),
     aperm(array(0:23, c(4, 3, 2)))
@@ -150,7 +150,7 @@ test_that("values of every sort arrive from a real server as Python had them", {
 
 test_that("integers of a real server that R cannot hold are errors, not NA", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   for (name in c("LargeIntegers", "SmallestInteger", "LargestNatural")) {
     expect_error(make_odd(name, server)$reset(), "beyond 2^53 - 1", fixed = TRUE,
                  class = "gym_error_space")
@@ -158,7 +158,7 @@ test_that("integers of a real server that R cannot hold are errors, not NA", {
 })
 
 test_that("an action comes back from a real server as it was sent", {
-  env <- make_odd("Echo", local_odd_server())
+  env <- make_odd("Echo", odd_server())
   env$reset()
   values <- matrix(c(1 / 3, -1e300, 5e-324, 0, pi, -0.1), 2)
   expect_identical(env$step(values)$observation, values)
@@ -168,7 +168,7 @@ test_that("an action comes back from a real server as it was sent", {
 
 test_that("a bare number is an action of a Box of one number", {
   skip_unless_all()
-  env <- make_odd("OneNumber", local_odd_server())
+  env <- make_odd("OneNumber", odd_server())
   env$reset()
   expect_equal(env$step(0.5)$reward, 1)
   expect_false(space_contains(env$action_space, 2))
@@ -178,7 +178,7 @@ test_that("a bare number is an action of a Box of one number", {
 
 test_that("a space that is not known is refused at creation and named", {
   skip_unless_all()
-  expect_error(make_odd("Riddle", local_odd_server()), "Riddle", class = "gym_error_http_400")
+  expect_error(make_odd("Riddle", odd_server()), "Riddle", class = "gym_error_http_400")
 })
 
 nested <- function() {
@@ -267,7 +267,7 @@ test_that("keys that are missing or strange are named", {
 
 test_that("a value outside of a nested space is named by a real server, too", {
   skip_unless_all()
-  env <- make_odd("Nested", local_odd_server())
+  env <- make_odd("Nested", odd_server())
   env$reset()
   good <- list(position = c(0, 0, 0), "a.b" = 1)
   expect_identical(env$step(good)$reward, 1)

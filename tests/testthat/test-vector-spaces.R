@@ -2,13 +2,6 @@
 # mirror_environments.py. The sub-environments begin with different values, so that none can be
 # taken for another.
 
-local_mirror_sub_envs <- function(frame = parent.frame()) {
-  withr::local_envvar(
-    PYTHONPATH = paste(c(test_path(), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep)
-  )
-  local_server(allow_module = "mirror_environments", frame = frame)
-}
-
 # Sends back what the sub-environments show. Returns that, and what a mirror found different.
 play_sub_envs <- function(env, values, tensors) {
   instance <- known_instance(env$client, env$instance_id)
@@ -43,7 +36,7 @@ make_mirrors <- function(server, ...) {
 
 test_that("values of random spaces reach Python in the sub-environment that they are for", {
   skip_unless_all()
-  server <- local_mirror_sub_envs()
+  server <- odd_server()
   kinds <- character()
   problems <- character()
   played <- tensors <- 0L
@@ -90,7 +83,7 @@ expect_shows <- function(space, batch, i, value, number) {
 
 test_that("the last observation of a sub-environment is kept for every kind of space", {
   skip_unless_all()
-  server <- local_mirror_sub_envs()
+  server <- odd_server()
   for (number in 1:40) {
     env <- make_mirrors(server, number = number, values = 2, num_envs = 2,
                         autoreset_mode = "SameStep")
@@ -118,7 +111,7 @@ test_that("the last observation of a sub-environment is kept for every kind of s
 
 test_that("infos have an entry for each sub-environment, and pictures one dimension more", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   env <- gym_make("odd_environments:Telling-v0", num_envs = 2, client = server)
   env$reset()
   out <- env$step(c(0, 0))
@@ -138,7 +131,7 @@ test_that("infos have an entry for each sub-environment, and pictures one dimens
 
 test_that("numbers of sub-environments keep their types, and what R cannot hold is an error", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   make <- function(name) {
     gym_make(paste0("odd_environments:", name, "-v0"), num_envs = 2, client = server)
   }
@@ -154,7 +147,7 @@ test_that("numbers of sub-environments keep their types, and what R cannot hold 
 
 test_that("the server draws actions of a vector environment in the form in which it takes them", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
   drawn <- env_action_space_sample(server, env$instance_id)
@@ -168,7 +161,7 @@ test_that("the server draws actions of a vector environment in the form in which
 
 test_that("an error about a nested action names the sub-environment", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   env <- gym_make("odd_environments:Nested-v0", num_envs = 3, client = server)
   env$reset()
   good <- list(position = matrix(0, 3, 3), "a.b" = c(1, 0, 1))
@@ -184,7 +177,7 @@ test_that("an error about a nested action names the sub-environment", {
 
 test_that("an exception in one sub-environment is an error, and the server goes on", {
   skip_unless_all()
-  server <- local_odd_server()
+  server <- odd_server()
   env <- gym_make("odd_environments:Failing-v0", num_envs = 2, client = server)
   env$reset()
   expect_error(env$step(c(0, 1)), "the pole caught fire", class = "gym_error_http_500")

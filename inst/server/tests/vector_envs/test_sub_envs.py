@@ -95,7 +95,8 @@ def test_any_number_of_processes_gives_the_same_bytes(make, kept_processes, spac
         env.close()
         return came
 
-    came = [came_of(num_workers) for num_workers in (0, 1, 2, 3, 5)]
+    # None; some with more sub-environments than others; one for each.
+    came = [came_of(num_workers) for num_workers in (0, 2, 5)]
     assert all(one == came[0] for one in came)
 
 
