@@ -16,9 +16,6 @@
 #' After a terminated one there is nothing to come. If the policy has `normalize = TRUE`, the first
 #' iteration plays random episodes, as in [agent_ppo()].
 #'
-#' A checkpoint keeps the memory in files beside its own, such as `training.rds.memory-0` for
-#' `training.rds`. Only new steps are appended to them.
-#'
 #' @param memory The largest number of steps in the memory, a whole number. The oldest are
 #'   forgotten. The default is 50,000.
 #' @param learning_starts The number of steps before learning begins, a whole number. The default
@@ -210,7 +207,31 @@ dqn_update <- function(policy, state, rows, settings) {
 
 # The memory ---------------------------------------------------------------------------------
 
-# A row of the memory: the observation, the next observation, action, reward, and whether it
+# Make an empty memory: `size`, the largest number of steps, of which the oldest are overwritten;
+# `count`, the number of all steps so far; `steps`, a matrix with the numbers of a step in each
+# column.
+new_memory <- function(size) {
+  structure(list(size = size, count = 0, steps = NULL), class = "gym_memory")
+}
+
+# Add a matrix with a step in each column.
+add_to_memory <- function(memory, new) {
+  n <- ncol(new)
+  # If there are more than fit, only the last ones.
+  kept <- seq.int(max(1, n - memory$size + 1), n)
+  at <- (memory$count + kept - 1) %% memory$size + 1
+  room <- max(0L, ncol(memory$steps))
+  if (max(at) > room) {
+    grown <- matrix(0, nrow(new), min(memory$size, max(2 * room, at, 1024)))
+    if (room) grown[, seq_len(room)] <- memory$steps
+    memory$steps <- grown
+  }
+  memory$steps[, at] <- new[, kept]
+  memory$count <- memory$count + n
+  memory
+}
+
+# A column of the memory: the observation, the next observation, action, reward, and whether it
 # terminated.
 remembered <- function(policy, trajectories) {
   rbind(

@@ -210,10 +210,6 @@ next_values <- function(value, last_value, terminated, last) {
 #' Estimate advantages (generalized advantage estimation, Schulman et al. 2016)
 #' @param after As next_values() returns it.
 #' @noRd
-estimate_advantages <- function(reward, value, after, last, gamma, lambda) {
-  sum_backwards(reward + gamma * after - value, gamma * lambda, last)
-}
-
 # Divides rewards by the standard deviation of the discounted return so far and clips them at 10.
 # Returns a list: `reward`, and the `moments` of that return.
 scale_rewards <- function(reward, last, gamma, moments) {
@@ -255,8 +251,8 @@ new_adam <- function(count) list(mean = numeric(count), square = numeric(count),
 #' @return A list: `weights` and `adam`.
 #' @noRd
 adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
-  # An operation with all weights takes some percent of an update, so there are few of them: this
-  # mean is 0.9 * mean + 0.1 * gradient.
+  # Each operation on all weights takes some percent of an update, so there are few. The
+  # result is 0.9 * mean + 0.1 * gradient.
   steps <- adam$steps + 1
   mean <- adam$mean + 0.1 * (gradient - adam$mean)
   square <- adam$square + 0.001 * (gradient * gradient - adam$square)

@@ -136,15 +136,14 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
 
   # Log-probabilities and values by the networks that played. The outputs of hidden layers for all
   # steps are not kept: they would fill most of the memory after which R collects garbage.
-  before <- ppo_forward(agent$policy, agent$value, weights, rows$inputs, rows$action)
-  before <- list(log_prob = before$draws$log_prob, value = before$value)
+  rows$log_prob <- forward_draws(agent$policy, weights, rows$inputs, rows$action)$draws$log_prob
+  value <- expected_values(agent$value, rows$inputs)
   last_value <- expected_values(agent$value, rows$last_inputs)
-  after <- next_values(before$value, last_value, rows$terminated, rows$last)
-  rows$advantage <- estimate_advantages(
-    reward, before$value, after, rows$last, agent$gamma, agent$lambda
-  )
-  rows$return <- rows$advantage + before$value
-  rows$log_prob <- before$log_prob
+  after <- next_values(value, last_value, rows$terminated, rows$last)
+  # The temporal-difference errors of an episode, summed up from its end.
+  errors <- reward + agent$gamma * after - value
+  rows$advantage <- sum_backwards(errors, agent$gamma * agent$lambda, rows$last)
+  rows$return <- rows$advantage + value
 
   epochs <- lapply(seq_len(agent$epochs), function(epoch) {
     draw_minibatches(length(reward), agent$batch)
@@ -156,7 +155,7 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
   agent$value <- with_weights(agent$value, learned$weights[-of_policy])
   agent$adam <- learned$adam
   agent$log[] <- c(
-    learned$log, explained_variance = explained_variance(before$value, rows$return),
+    learned$log, explained_variance = explained_variance(value, rows$return),
     learning_rate = now$learning_rate
   )[ppo_log]
   end_iteration(agent, results)
@@ -205,44 +204,37 @@ ppo_update <- function(policy, value, weights, adam, rows, epochs, settings) {
 #' @noRd
 ppo_gradient <- function(policy, value, weights, batch, settings) {
   n <- length(batch$return)
-  both <- ppo_forward(policy, value, weights, batch$inputs, batch$action)
+  of_policy <- forward_draws(policy, weights, batch$inputs, batch$action)
+  draws <- of_policy$draws
+  of_value <- forward_network(value, weights, batch$inputs, start = count_weights(policy))
   advantage <- batch$advantage
   if (settings$normalize_advantages) advantage <- standardized(advantage)
 
   # The objective is the smaller of ratio x advantage and clipped ratio x advantage; beyond the
   # clip, in the direction of the advantage, it has no slope.
-  log_ratio <- both$draws$log_prob - batch$log_prob
+  log_ratio <- draws$log_prob - batch$log_prob
   ratio <- exp(log_ratio)
   clipped <- pmin.int(pmax.int(ratio, 1 - settings$clip), 1 + settings$clip)
   objective <- pmin.int(ratio * advantage, clipped * advantage)
   counts <- (advantage >= 0 & ratio <= 1 + settings$clip) |
     (advantage < 0 & ratio >= 1 - settings$clip)
-  error <- both$value - batch$return
+  error <- of_value$outputs[1L, ] - batch$return
   gradient <- c(
     draws_gradient(
-      policy, both$of_policy, -(advantage * ratio * counts) / n, -settings$entropy / n
+      policy, of_policy, -(advantage * ratio * counts) / n, -settings$entropy / n
     ),
-    backward_network(both$of_value, matrix(2 * settings$value_weight / n * error, 1L))
+    backward_network(of_value, matrix(2 * settings$value_weight / n * error, 1L))
   )
   # Means without mean(), whose method takes as long as a small product of matrices.
   policy_loss <- -sum(objective) / n
   value_loss <- sum(error * error) / n
-  entropy_loss <- -sum(both$draws$entropy) / n
+  entropy_loss <- -sum(draws$entropy) / n
   list(gradient = gradient, log = c(
     approx_kl = sum(ratio - 1 - log_ratio) / n,
     clip_fraction = sum(abs(ratio - 1) > settings$clip) / n,
     entropy_loss = entropy_loss, policy_gradient_loss = policy_loss, value_loss = value_loss,
     loss = policy_loss + settings$entropy * entropy_loss + settings$value_weight * value_loss
   ))
-}
-
-ppo_forward <- function(policy, value, weights, inputs, action) {
-  of_policy <- forward_draws(policy, weights, inputs, action)
-  of_value <- forward_network(value, weights, inputs, start = count_weights(policy))
-  list(
-    draws = of_policy$draws, value = of_value$outputs[1L, ], of_policy = of_policy,
-    of_value = of_value
-  )
 }
 
 #' @export

@@ -47,7 +47,7 @@
 #' agent_presets()[c("env_id", "agent", "directions", "step_size", "noise", "origin")]
 agent_presets <- function(env_id = NULL) {
   check_string(env_id, allow_null = TRUE)
-  presets <- list(own_presets(env_id), sb3_presets(env_id))
+  presets <- lapply(paste0(c("agent", "sb3"), "-presets.csv"), read_presets, env_id)
   columns <- unique(unlist(lapply(presets, names)))
   do.call(rbind, lapply(presets, function(table) {
     others <- setdiff(columns, names(table))
@@ -56,12 +56,8 @@ agent_presets <- function(env_id = NULL) {
   }))
 }
 
-# Those of the agents of this package, and those of learn_sb3().
-own_presets <- function(env_id = NULL) read_presets("agent-presets.csv", env_id)
-
-sb3_presets <- function(env_id = NULL) read_presets("sb3-presets.csv", env_id)
-
-read_presets <- function(name, env_id) {
+# By default those of the agents of this package; "sb3-presets.csv" has those of learn_sb3().
+read_presets <- function(name = "agent-presets.csv", env_id = NULL) {
   file <- system.file("extdata", name, package = "gym", mustWork = TRUE)
   presets <- utils::read.csv(file, stringsAsFactors = FALSE)
   for (name in c("kwargs", "source")) {
@@ -76,15 +72,16 @@ read_presets <- function(name, env_id) {
 }
 
 # The preset of an agent for an environment with these arguments, a list, or `NULL`.
-find_preset <- function(agent, env, kwargs, presets = own_presets(env)) {
+find_preset <- function(agent, env, kwargs, file = "agent-presets.csv") {
   if (!is.character(env)) {
     return(NULL)
   }
+  presets <- read_presets(file, env)
   presets <- presets[presets$agent == agent, ]
   for (row in seq_len(nrow(presets))) {
     preset <- as.list(presets[row, ])
     own <- if (nzchar(preset$kwargs)) from_json(preset$kwargs) else list()
-    if (identical(sorted_by_name(own), sorted_by_name(kwargs))) {
+    if (setequal(names(own), names(kwargs)) && all(mapply(identical, own, kwargs[names(own)]))) {
       return(preset_settings(preset))
     }
   }
@@ -110,9 +107,6 @@ preset_arguments <- function(preset) {
   make <- get(paste0("agent_", preset$agent), mode = "function")
   preset[intersect(names(formals(make)), names(preset))]
 }
-
-# Two empty lists are equal, with names or without.
-sorted_by_name <- function(values) if (length(values)) values[order(names(values))] else list()
 
 #' Make an agent and train it
 #'
@@ -197,7 +191,7 @@ with_preset <- function(agent, preset, given) {
 
 # Name the presets of the environment if the user's arguments fit none of them.
 other_presets_text <- function(env) {
-  presets <- if (is.character(env)) own_presets(env)
+  presets <- if (is.character(env)) read_presets(env_id = env)
   if (NROW(presets)) {
     known <- paste0("\"", presets$agent, "\"", ifelse(nzchar(presets$kwargs), " with ", ""),
                     presets$kwargs, collapse = ", ")
@@ -206,15 +200,15 @@ other_presets_text <- function(env) {
 }
 
 preset_policy <- function(preset, agent) {
-  if (learns_online(agent)) {
-    # A learner makes its own.
-    NULL
-  } else if (inherits(agent, "gym_agent_gradient")) {
+  if (inherits(agent, "gym_agent_gradient")) {
     policy <- default_policy(agent)
     if (!is.null(preset$hidden)) policy$sizes[2:3] <- preset$hidden
     policy$init <- preset$init %||% policy$init
     if (isTRUE(preset$normalize)) policy$moments <- no_moments()
     policy
+  } else if (learns_online(agent)) {
+    # A learner makes its own.
+    NULL
   } else if (is.null(preset$hidden)) {
     policy_linear(bias = preset$bias)
   } else {

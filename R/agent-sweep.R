@@ -82,7 +82,7 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   check_not_of_agent(names(dots), names(formals(agent)), place, call)
   # The preset that the agent's own trainer, such as learn_ppo(), would use.
   kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))),
-                 unique(own_presets()$agent))
+                 unique(read_presets()$agent))
   kwargs <- dots[setdiff(names(dots), names(formals(train_agent)))]
   preset <- if (length(kind)) find_preset(kind, env, kwargs)
   if (!is.null(preset)) inform_of_preset(preset, env)
@@ -179,11 +179,11 @@ sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, clien
     if (!is.null(folder)) {
       own$checkpoint <- file.path(folder, paste0(gsub("[^A-Za-z0-9.=-]+", "_", name), ".rds"))
     }
-    training_job(own, kwargs, client, call)
+    training_settings(own, kwargs, client, call)
   })
   runs <- unlist(lapply(seq_along(jobs), function(at) {
     lapply(seeds, function(seed) {
-      run <- run_of_seed(jobs[[at]]$settings, seed, jobs[[at]]$files, call)
+      run <- settings_of_seed(jobs[[at]], seed, call)
       c(run, list(job = at, keeps_error = TRUE))
     })
   }), recursive = FALSE)
@@ -193,25 +193,23 @@ sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, clien
     results[[length(results) + 1L]] <<- result
     show(length(results))
   }
-  max_steps <- jobs[[1L]]$settings$max_steps
   train_here <- function() {
     for (run in runs) {
-      in_env <- jobs[[run$job]]$in_env
-      result <- train_seed(run, function(play, ignored) in_env(play, max_steps), client, call)
+      in_env <- function(play) with_training_env(run, play, client, call)
+      result <- train_seed(run, in_env, client, call)
       if (isTRUE(result$interrupted)) rlang::interrupt()
       keep(result)
     }
   }
   train_all <- function(vector_env) {
-    if (seeds_go_to_workers(vector_env, jobs[[1L]]$settings)) {
-      train_in_futures(vector_env, runs, keep, call)
-      TRUE
-    } else {
-      FALSE
-    }
+    workers <- seeds_go_to_workers(vector_env, jobs[[1L]])
+    if (workers) train_in_futures(vector_env, runs, keep, call)
+    workers
   }
   interrupted <- until_interrupted(
-    if (plan_kind() == "none" || !jobs[[1L]]$in_env(train_all, max_steps)) train_here(),
+    if (plan_kind() == "none" || !with_training_env(jobs[[1L]], train_all, client, call)) {
+      train_here()
+    },
     "Interrupted after {finished} of {total} run{?s}; what was finished is returned.",
     function() length(results), length(runs)
   )
@@ -223,13 +221,13 @@ sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, clien
   }, "")
   trainings <- lapply(seq_along(jobs), function(at) {
     whole <- results[job == at & is.na(errors)]
-    if (length(whole)) new_trainings(whole, jobs[[at]]$settings, elapsed, interrupted)
+    if (length(whole)) new_trainings(whole, jobs[[at]], elapsed, interrupted)
   })
   list(
     trainings = stats::setNames(trainings, names(agents)), interrupted = interrupted,
     runs = data.frame(
       setting = names(agents)[job], error = errors,
-      seed = vapply(runs, function(run) as.numeric(run$settings$seed), 0)
+      seed = vapply(runs, function(run) as.numeric(run$seed), 0)
     )[c("setting", "seed", "error")]
   )
 }

@@ -86,7 +86,27 @@ check_outputs <- function(policy, env, call) {
     abort_fit(policy, paste("A network cannot choose from", format(space)), env, call)
   }
   discrete <- inherits(space, "gym_space_discrete")
-  check_output_kind(policy, space, env, call)
+  fits <- switch(policy$output,
+    greedy = TRUE,
+    gaussian = !discrete && !space$dtype %in% integer_dtypes,
+    discrete
+  )
+  needs <- if (is_gaussian(policy)) "a Box of real numbers" else "a Discrete action space"
+  abort_if(
+    !fits, "policy", policy, call,
+    'The output "{policy$output}" needs {needs}, but {environment_label(env)} takes actions of
+     {format(space)}.',
+    i = if (!discrete) {
+      '`output = "gaussian"` draws numbers, and `agent_ppo()` trains such a network.'
+    }
+  )
+  bounded <- discrete || all(is.finite(c(space$low, space$high)))
+  abort_if(
+    !bounded && has_range(policy), "policy", policy, call,
+    'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
+     {environment_label(env)} takes {format(space)} with a side without a bound.',
+    i = 'Outputs of "identity" are taken as they are.'
+  )
   rounded <- discrete && outputs == 1L && width == 2 && policy$output != "softmax"
   if (outputs != width && !rounded) {
     takes <- if (discrete) "has" else "takes an action of"
@@ -96,33 +116,6 @@ check_outputs <- function(policy, env, call) {
     )
     abort_fit(policy, problem, env, call)
   }
-}
-
-check_output_kind <- function(policy, space, env, call) {
-  discrete <- inherits(space, "gym_space_discrete")
-  fits <- switch(policy$output,
-    greedy = TRUE,
-    gaussian = !discrete && !space$dtype %in% integer_dtypes,
-    discrete
-  )
-  if (!fits) {
-    needs <- if (is_gaussian(policy)) "a Box of real numbers" else "a Discrete action space"
-    abort_wrong(
-      "policy", policy, call,
-      'The output "{policy$output}" needs {needs}, but {environment_label(env)} takes actions of
-       {format(space)}.',
-      i = if (!discrete) {
-        '`output = "gaussian"` draws numbers, and `agent_ppo()` trains such a network.'
-      }
-    )
-  }
-  bounded <- discrete || all(is.finite(c(space$low, space$high)))
-  abort_if(
-    !bounded && has_range(policy), "policy", policy, call,
-    'The outputs of "{output_activation(policy)}" are scaled to the bounds of the action, but
-     {environment_label(env)} takes {format(space)} with a side without a bound.',
-    i = 'Outputs of "identity" are taken as they are.'
-  )
 }
 
 # Names the sizes that would fit, with the same hidden layers.

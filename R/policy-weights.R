@@ -23,8 +23,8 @@ draw_orthogonal <- function(shape, gain, bias) {
 draw_first_weights <- function(policy) {
   shapes <- weight_shapes(policy$sizes, policy$bias)
   if (policy$init == "orthogonal") {
-    # If actions are drawn, all of them are nearly equally likely at first. An output that the
-    # environment chooses will draw.
+    # With small weights all actions are about equally likely at first. An output that the
+    # environment chooses later draws its actions, too.
     draws <- is.na(policy$output) || has_log_prob(policy)
     gain <- c(rep(sqrt(2), length(shapes) - 1L), if (draws) 0.01 else 1)
     return(Map(draw_orthogonal, shapes, gain, isTRUE(policy$bias)))
@@ -54,24 +54,22 @@ check_weights <- function(weights, sizes, bias = FALSE, name = "weights",
     abort_argument(weights, must, name, call)
   }
   for (i in seq_along(wanted)) {
-    check_layer(weights[[i]], wanted[[i]], bias, paste0(name, "[[", i, "]]"), call)
-  }
-}
-
-check_layer <- function(layer, wanted, bias, arg, call) {
-  if (!is.matrix(layer) || !is.numeric(layer)) {
-    abort_argument(layer, "a numeric matrix", arg, call)
-  }
-  if (!identical(dim(layer), as.integer(wanted))) {
-    turned <- identical(rev(dim(layer)), as.integer(wanted))
-    abort_wrong(
-      arg, layer, call,
-      '`{arg}` must be a matrix of {paste(wanted, collapse = " x ")} for these
+    layer <- weights[[i]]
+    shape <- as.integer(wanted[[i]])
+    arg <- paste0(name, "[[", i, "]]")
+    if (!is.matrix(layer) || !is.numeric(layer)) {
+      abort_argument(layer, "a numeric matrix", arg, call)
+    }
+    abort_if(
+      !identical(dim(layer), shape), arg, layer, call,
+      '`{arg}` must be a matrix of {paste(shape, collapse = " x ")} for these
        sizes{if (isTRUE(bias)) " and a bias"}, not of {paste(dim(layer), collapse = " x ")}.',
-      i = if (turned) "`t()` transposes it: a row is a neuron, a column one of its inputs."
+      i = if (identical(rev(dim(layer)), shape)) {
+        "`t()` transposes it: a row is a neuron, a column one of its inputs."
+      }
     )
+    if (anyNA(layer)) abort_argument(layer, "without missing values", arg, call)
   }
-  if (anyNA(layer)) abort_argument(layer, "without missing values", arg, call)
 }
 
 # The weights as one vector, layer after layer, each matrix column after column, and then the

@@ -188,7 +188,7 @@ check_sb3_env <- function(env, call) {
 # The user's values replace the preset's, and what is left has the library's defaults.
 with_sb3_preset <- function(settings) {
   env <- settings$env
-  preset <- find_preset(settings$algorithm, env, settings$env_kwargs, sb3_presets(env))
+  preset <- find_preset(settings$algorithm, env, settings$env_kwargs, "sb3-presets.csv")
   if (!is.null(preset)) {
     inform_of_preset(preset, env)
     arguments <- from_json(preset$arguments)

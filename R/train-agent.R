@@ -199,23 +199,22 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   call <- rlang::current_env()
   check_agent(agent, call)
   force(env)
-  # The client stays a promise: what needs no server must not start one.
+  # Do not evaluate `client`: a training that needs no server must not start one.
   given <- mget(setdiff(names(formals()), c("...", "client")), call)
-  job <- training_job(given, list(...), client, call)
-  if (is.null(seeds)) {
-    do_run(job$run, job$in_env, max_steps, client, progress, call)
-  } else {
-    train_seeds(job$in_env, job$settings, job$seeds, job$files, progress, client, call)
+  settings <- training_settings(given, list(...), client, call)
+  if (!is.null(seeds)) {
+    return(train_seeds(settings, seeds, progress, client, call))
   }
+  in_env <- function(play) with_training_env(settings, play, client, call)
+  do_run(settings, in_env, client, progress, call)
 }
 
-#' Prepare to train
+#' Check the arguments of a training and complete them
 #' @param given The arguments of [train_agent()] but for `...` and `client`, a list.
 #' @param kwargs The environment's own arguments.
-#' @return A list: `settings`, `files`, as for [new_run()], `seeds`, and where these are `NULL` the
-#'   `run`; `in_env`, a function that makes the environment and calls a function with it.
+#' @return A list, the settings; without `seeds` as [with_checkpoint()] returns them.
 #' @noRd
-training_job <- function(given, kwargs, client, call) {
+training_settings <- function(given, kwargs, client, call) {
   env <- given$env
   check_no_steps(names(kwargs), call)
   budget <- !is.null(given$iterations) || !is.null(given$total_steps)
@@ -230,12 +229,13 @@ training_job <- function(given, kwargs, client, call) {
   check_flag(given$model, arg = "model", call = call)
   settings <- c(
     given[c("agent", "env", "iterations", "total_steps", "episodes", "target", "max_steps",
-            "eval_every", "eval_episodes", "eval_episodes_curve", "seed", "callback")],
+            "eval_every", "eval_episodes", "eval_episodes_curve", "seed", "callback",
+            "checkpoint", "resume")],
     list(
       kwargs = kwargs,
       policy = policy_to_train(given$policy, agent),
       evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
-      # By the tutorial's rule the training is a search, and each candidate an iteration, a round.
+      # By the tutorial's rule the training is a search, in which each candidate is a round.
       search = search,
       may_sample = online && given$model
     )
@@ -245,8 +245,7 @@ training_job <- function(given, kwargs, client, call) {
   for (name in c("log", "checkpoint")) {
     check_string(given[[name]], allow_null = TRUE, arg = name, call = call)
   }
-  seeds <- plain_numbers(given$seeds)
-  if (!is.null(seeds)) check_training_seeds(seeds, given$seed, call)
+  if (!is.null(given$seeds)) check_training_seeds(given$seeds, given$seed, call)
   settings[c("what", "unit")] <- if (settings$search) {
     c("search", "round")
   } else {
@@ -254,11 +253,9 @@ training_job <- function(given, kwargs, client, call) {
   }
   settings$num_envs <- given$num_envs %||% if (online) learner_envs(env, agent)
   settings$num_workers <- given$num_workers
-  log <- if (!is.null(given$log)) absolute_path(given$log)
-  files <- list(checkpoint = given$checkpoint, log = log, resume = given$resume)
-  run <- if (is.null(seeds)) new_run(settings, files, call)
-  settings$seed <- run$settings$seed
-  settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% seeds)
+  settings$log <- if (!is.null(given$log)) absolute_path(given$log)
+  if (is.null(given$seeds)) settings <- with_checkpoint(settings, call)
+  settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% given$seeds)
   settings$model <- if (online) judging_model(settings, client)
   settings["eval_steps"] <- list(steps_between_evaluations(settings$model, settings$max_steps))
   # `learn_q("Taxi-v4")` is `learn_q(env_model("Taxi-v4"))`.
@@ -268,19 +265,13 @@ training_job <- function(given, kwargs, client, call) {
   } else {
     settings[c("env", "kwargs")]
   }
-  if (!is.null(run)) run$settings <- settings
-  list(
-    settings = settings, files = files, seeds = seeds, run = run,
-    in_env = function(play, max_steps = NULL) {
-      with_training_env(settings, play, max_steps, client, call)
-    }
-  )
+  settings
 }
 
 least_sub_envs <- 100
 
 # Candidates are played in parallel even if an evaluation has few episodes.
-with_training_env <- function(settings, play, max_steps, client, call) {
+with_training_env <- function(settings, play, client, call, max_steps = settings$max_steps) {
   episodes <- if (settings$search) {
     as.numeric(settings$iterations %||% least_sub_envs) * settings$episodes
   } else {
@@ -292,7 +283,7 @@ with_training_env <- function(settings, play, max_steps, client, call) {
   on.exit(if (!is.null(evaluated)) evaluated$close(wait = FALSE))
   play_both <- function(vector_env) {
     if (calls_r(played$env) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
-      # The learner plays alone, its evaluations need not.
+      # The learner plays in one sub-environment, its evaluations may play in many.
       vector_env$make_evaluated <- function() {
         if (is.null(evaluated)) {
           evaluated <<- rlang::exec(
@@ -324,30 +315,25 @@ iteration_candidates <- function(agent) {
   )
 }
 
-#' Prepare a run: one training, with its seed and its files
-#' @param files A list of `checkpoint`, `log` and `resume`, as for [train_agent()].
-#' @return A list: `settings`, `file`, as returned by [open_checkpoint()] (`NULL` for none), and
-#'   `log`, the folder.
-#' @noRd
-new_run <- function(settings, files, call) {
-  file <- if (!is.null(files$checkpoint)) {
-    open_checkpoint(
-      files$checkpoint, training_arguments(settings), files$resume, settings$what, call
+# Adds to the settings of one training its seed and `file`, the result of open_checkpoint().
+with_checkpoint <- function(settings, call) {
+  if (!is.null(settings$checkpoint)) {
+    settings$file <- open_checkpoint(
+      settings$checkpoint, training_arguments(settings), settings$resume, settings$what, call
     )
   }
-  settings$seed <- file$saved$seed %||% settings$seed %||% draw_seed()
-  list(settings = settings, file = file, log = files$log)
+  settings$seed <- settings$file$saved$seed %||% settings$seed %||% draw_seed()
+  settings
 }
 
 # A finished training does not need an environment.
-do_run <- function(run, in_env, max_steps, client, progress, call) {
-  finished <- if (!is.null(run$file$saved)) finished_training(run, client)
-  finished %||% in_env(function(vector_env) train_in(vector_env, run, progress, call), max_steps)
+do_run <- function(settings, in_env, client, progress, call) {
+  finished <- if (!is.null(settings$file$saved)) finished_training(settings, client)
+  finished %||% in_env(function(vector_env) train_in(vector_env, settings, progress, call))
 }
 
 # Trains in a given vector environment.
-train_in <- function(vector_env, run, progress, call) {
-  settings <- run$settings
+train_in <- function(vector_env, settings, progress, call) {
   settings["given_target"] <- list(settings$target)
   settings["target"] <- list(training_target(settings, vector_env$spec))
   settings$env_id <- environment_label(vector_env)
@@ -356,7 +342,7 @@ train_in <- function(vector_env, run, progress, call) {
   online <- learns_online(settings$agent)
   check_training_ends(vector_env, settings, online, call)
   playing <- if (online && !plays_whole(settings$agent)) stepped(vector_env) else vector_env
-  settings$provenance <- run$file$saved$provenance %||% new_provenance(playing, settings)
+  settings$provenance <- settings$file$saved$provenance %||% new_provenance(playing, settings)
   bound <- if (online) {
     spaces_policy(settings$policy, vector_env, settings$model, call)
   } else {
@@ -371,7 +357,7 @@ train_in <- function(vector_env, run, progress, call) {
     started = now(), report = function(ended) NULL, log = function() NULL,
     checkpoint = function(last = FALSE) NULL
   )
-  if (has_started(settings$agent)) {
+  if (isTRUE(settings$agent$started)) {
     state$agent <- continued_agent(settings$agent, bound, call)
   } else {
     state$agent <- with_generator(
@@ -380,8 +366,10 @@ train_in <- function(vector_env, run, progress, call) {
     check_is_agent(state$agent, "agent_start()", call)
     state$agent$started <- TRUE
   }
-  if (!is.null(run$file)) state$checkpoint <- training_checkpoint(state, run$file, settings, call)
-  if (!is.null(run$log)) state$log <- training_log(run$log, settings, state, call)
+  if (!is.null(settings$file)) state$checkpoint <- training_checkpoint(state, settings, call)
+  if (!is.null(settings$log)) {
+    state$log <- training_log(settings$log, settings, state, call)
+  }
   run_training(state, vector_env, settings, progress, call)
 }
 

@@ -50,10 +50,10 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
 #'
 #' The file grows. If iterations are short, writing may take longer than playing. The file is then
 #' not written after each iteration, and those since the last write would be played again.
-#' @param file As returned by [open_checkpoint()].
 #' @return A function that is called after each iteration, and at the end with `last = TRUE`.
 #' @noRd
-training_checkpoint <- function(state, file, settings, call) {
+training_checkpoint <- function(state, settings, call) {
+  file <- settings$file
   # In addition to the arguments: the settings that the server determines.
   server <- settings[c(
     if (settings$search) "target", "env_id", "num_envs", "batch_size", "from_model"
@@ -71,7 +71,7 @@ training_checkpoint <- function(state, file, settings, call) {
       paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
              describe_value(server[[name]]), " on this server.")
     }, call, are_arguments = FALSE)
-    resume_training(state, file$saved, file$path, call)
+    resume_training(state, file$saved)
     # With a larger budget the final evaluation comes later.
     state$final <- NULL
     state$evaluations <- Filter(function(row) row$kind != "final", state$evaluations)
@@ -85,24 +85,20 @@ training_checkpoint <- function(state, file, settings, call) {
     inform_resumed("Going on from {.path {file$path}}, after {played}.")
   }
   state$path <- file$path
-  without_memory <- memory_writer(file$path, file$saved$training$agent$memory$key)
   checkpoint_writer(file, function() {
-    training <- mget(kept_of_training, state)
-    training$agent <- without_memory(training$agent)
     list(
       what = settings$what, arguments = file$arguments, server = server,
       given_target = settings$given_target, target = settings$target,
       policy = settings$policy, seed = settings$seed, provenance = settings$provenance,
-      training = training, streams = saved_streams(state$streams),
+      training = mget(kept_of_training, state), streams = saved_streams(state$streams),
       evaluation_streams = saved_streams(state$evaluation_streams),
       elapsed = now() - state$started
     )
   }, settings$what, call)
 }
 
-resume_training <- function(state, saved, path, call = NULL) {
+resume_training <- function(state, saved) {
   list2env(saved$training, state)
-  state$agent <- restore_memory(state$agent, path, call)
   state$streams <- restore_streams(saved$streams)
   state$evaluation_streams <- restore_streams(saved$evaluation_streams)
   state$started <- state$started - saved$elapsed
@@ -112,9 +108,9 @@ resume_training <- function(state, saved, path, call = NULL) {
 #' @param client The client for the result of a search.
 #' @return A training; `NULL` if there is something left to play.
 #' @noRd
-finished_training <- function(run, client) {
-  saved <- run$file$saved
-  settings <- run$settings
+finished_training <- function(settings, client) {
+  path <- settings$file$path
+  saved <- settings$file$saved
   if (!is_same(saved$given_target, settings$target)) {
     return(NULL)
   }
@@ -122,7 +118,7 @@ finished_training <- function(run, client) {
   settings[names(saved$server)] <- saved$server
   settings[c("policy", "provenance")] <- saved[c("policy", "provenance")]
   state <- rlang::env(started = now())
-  resume_training(state, saved, run$file$path)
+  resume_training(state, saved)
   search <- settings$search
   if (!is_over(settings, state) || !search && is.null(state$final)) {
     return(NULL)
@@ -133,7 +129,7 @@ finished_training <- function(run, client) {
     settings$client <- settings$env$client
   }
   inform_resumed(paste(
-    "This", settings$what, "had ended: {.path {run$file$path}} has its result.",
+    "This", settings$what, "had ended: {.path {path}} has its result.",
     "{.code resume = FALSE} plays it again."
   ))
   training_result(settings, state)

@@ -201,7 +201,8 @@ as.data.frame.gym_comparison <- function(x, row.names = NULL, optional = FALSE, 
 #' @export
 print.gym_comparison <- function(x, ...) print_lines(x, comparison_lines(x))
 
-# A training ends with the iteration that reaches its budget. With many trainings, those of all.
+# Trainings finish their last iteration, so they take more steps than their budget. With many
+# trainings, give the range of all.
 steps_taken_line <- function(runs) {
   of_few <- length(unique(runs$training)) <= 4L
   taken <- if (of_few) {

@@ -1,9 +1,5 @@
 # Training that goes on with what an earlier training has learned.
 
-# Training marks an agent that has started: it has a policy, and perhaps a value network, the state
-# of its optimiser, or a memory.
-has_started <- function(agent) isTRUE(agent$started)
-
 #' Find the agent that a training starts with
 #'
 #' An agent that was trained before goes on. So does a new agent if `policy` is an earlier training
@@ -17,10 +13,10 @@ agent_to_train <- function(agent, policy, search, call) {
   } else if (search || !is.null(policy)) {
     agent$started <- NULL
   }
-  if (has_started(agent)) {
+  if (isTRUE(agent$started)) {
     rate <- agent$learning_rate
     taken <- agent$steps %||% agent$taken
-    # A schedule that has come to its end at 0 would let the training go on in vain.
+    # With a schedule that has reached 0 the agent would learn nothing more.
     abort_if(
       is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0),
       "learning_rate", rate, call,
@@ -40,7 +36,7 @@ agent_to_train <- function(agent, policy, search, call) {
 
 # Whether `x` is a training by an agent of this package and class.
 goes_on_from <- function(x, class) {
-  inherits(x, "gym_training") && has_started(x$agent) && class(x$agent)[[1L]] == class &&
+  inherits(x, "gym_training") && isTRUE(x$agent$started) && class(x$agent)[[1L]] == class &&
     length(settings_of(x$agent))
 }
 
@@ -101,18 +97,15 @@ continued_agent <- function(agent, bound, call) {
 #' @return `NULL` for a learner that makes its own.
 #' @noRd
 policy_to_train <- function(policy, agent) {
-  own <- if (has_started(agent)) agent$policy else starting_policy(policy, agent)
-  if (learns_online(agent)) {
-    if (!has_started(agent)) own
+  online <- learns_online(agent)
+  own <- if (isTRUE(agent$started)) {
+    if (!online) agent$policy
+  } else if (inherits(agent, "gym_agent_gradient") && inherits(policy, "gym_training") &&
+               inherits(policy$agent, "gym_agent_gradient")) {
+    # The one that was trained, which draws its actions, not the one that was evaluated.
+    agent_policy(policy$agent)
   } else {
-    own %||% default_policy(agent)
+    trained_policy(policy)
   }
-}
-
-# The policy to start with: after an agent of gradients the one that it trained, which draws its
-# actions, not the one that was evaluated.
-starting_policy <- function(policy, agent) {
-  of_gradients <- function(x) inherits(x, "gym_agent_gradient")
-  both <- of_gradients(agent) && inherits(policy, "gym_training") && of_gradients(policy$agent)
-  if (both) agent_policy(policy$agent) else trained_policy(policy)
+  own %||% if (!online) default_policy(agent)
 }

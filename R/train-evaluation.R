@@ -36,11 +36,11 @@ training_ends <- function(state, vector_env, settings) {
   }
   reached <- reaches(recent_return(state), settings$target)
   if (!reached && state$iteration %% settings$eval_every == 0) {
-    curve <- evaluate_for_curve(state, vector_env, settings)
+    curve <- evaluate_agent(state, vector_env, settings, "curve")
     reached <- reaches(curve$mean_return, settings$target)
   }
   if (reached) {
-    stopping <- evaluate_agent(state, vector_env, settings, "stopping", settings$eval_episodes)
+    stopping <- evaluate_agent(state, vector_env, settings, "stopping")
     state$solved <- reaches(stopping$mean_return, settings$target)
   }
   state$solved
@@ -65,16 +65,16 @@ recent_return <- function(state) {
   stats::weighted.mean(of("mean_return")[counts], episodes[counts])
 }
 
-evaluate_for_curve <- function(state, vector_env, settings) {
-  episodes <- min(settings$eval_episodes_curve, settings$eval_episodes)
-  if (episodes > 0) evaluate_agent(state, vector_env, settings, "curve", episodes)
-}
-
 #' Evaluate the agent's policy, in new episodes or exactly by a model
 #' @param kind The purpose: `"curve"`, `"stopping"` or `"final"`.
 #' @return A row of the training's evaluations.
 #' @noRd
-evaluate_agent <- function(state, vector_env, settings, kind, episodes) {
+evaluate_agent <- function(state, vector_env, settings, kind) {
+  episodes <- settings$eval_episodes
+  if (kind == "curve") episodes <- min(settings$eval_episodes_curve, episodes)
+  if (episodes == 0) {
+    return(NULL)
+  }
   policy <- judged_policy(settings, state$agent)
   final <- kind == "final"
   last <- utils::tail(state$evaluations, 1L)

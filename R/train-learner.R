@@ -186,7 +186,7 @@ play_iteration <- function(state, vector_env, settings, learner) {
   history
 }
 
-# An infinite value would stay infinite.
+# An infinite reward makes a learned value infinite for ever.
 check_rewards <- function(reward, call) {
   if (!all(is.finite(reward))) {
     gym_abort(

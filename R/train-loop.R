@@ -12,7 +12,7 @@ run_training <- function(state, vector_env, settings, progress, call) {
     # The untrained policy, if its episodes are sure to end.
     limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
     begins <- !state$iteration && !length(state$evaluations) && !is.null(limit)
-    if (begins && !settings$search) evaluate_for_curve(state, vector_env, settings)
+    if (begins && !settings$search) evaluate_agent(state, vector_env, settings, "curve")
     while (!is_over(settings, state)) {
       train_iteration(state, vector_env, settings, call)
       state$ended <- training_ends(state, vector_env, settings)
@@ -25,7 +25,7 @@ run_training <- function(state, vector_env, settings, progress, call) {
       state$checkpoint(last = settings$search && is_over(settings, state))
     }
     if (!settings$search && is.null(state$final)) {
-      state$final <- evaluate_agent(state, vector_env, settings, "final", settings$eval_episodes)
+      state$final <- evaluate_agent(state, vector_env, settings, "final")
       state$log()
       state$checkpoint(last = TRUE)
     }
@@ -77,7 +77,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   # A behavior policy may be drawn.
   candidates <- with_generator(state$streams$agent, agent_behavior(agent))
   asked <- if (inherits(candidates, "gym_policy_network")) {
-    asked_weights(state, agent, length(stats::coef(candidates)), call)
+    asked_weights(state, agent, count_weights(candidates), call)
   }
   if (!is.null(asked)) candidates <- new_candidates(candidates, asked)
   episodes <- agent_episodes(agent, settings$episodes)

@@ -11,15 +11,13 @@ check_training_seeds <- function(seeds, seed, call) {
 #' Train with each seed
 #'
 #' An interrupt ends all trainings. So does an error, which carries the trainings so far; the last
-#' of them is the one that failed.
-#' @param in_env A function that makes the environment and calls a function with it. All trainings
-#'   share one environment, unless it remembers earlier episodes.
-#' @param files As for [new_run()].
+#' of them is the one that failed. All trainings share one environment, unless it remembers earlier
+#' episodes.
 #' @return As [gym_trainings].
 #' @noRd
-train_seeds <- function(in_env, settings, seeds, files, progress, client, call) {
+train_seeds <- function(settings, seeds, progress, client, call) {
   started <- now()
-  runs <- lapply(seeds, function(seed) run_of_seed(settings, seed, files, call))
+  runs <- lapply(seeds, function(seed) settings_of_seed(settings, seed, call))
   kept <- sum(!vapply(runs, function(run) is.null(run$file$saved), NA))
   if (kept > 0L) {
     inform_resumed("Going on from the files of {kept} of {length(seeds)} seed{?s}.")
@@ -47,9 +45,11 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
       return(train_in_futures(vector_env, runs, keep, call))
     }
     anew <- length(vector_env$remembers) && !is_playable(settings$env)
-    with_env <- if (anew) in_env else function(play, max_steps) play(vector_env)
+    in_env <- function(play) {
+      if (anew) with_training_env(settings, play, client, call, NULL) else play(vector_env)
+    }
     for (run in runs) {
-      training <- train_seed(run, with_env, client, call)
+      training <- train_seed(run, in_env, client, call)
       keep(training)
       if (training$interrupted) {
         rlang::interrupt()
@@ -58,7 +58,7 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
   }
   interrupted <- tryCatch(
     until_interrupted(
-      in_env(train_all, settings$max_steps),
+      with_training_env(settings, train_all, client, call),
       "Interrupted after {finished} of {total} seed{?s}; the finished ones are returned.",
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
@@ -74,7 +74,9 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
       abort_with_result(
         if (in_training) cnd$parent %||% cnd else cnd, paste("The", settings$what), result(),
         finished, unique(paste0("gym_error_", c(settings$what, "training"))), call,
-        if (!is.null(files$checkpoint)) "After a fix, the same call resumes from the checkpoints."
+        if (!is.null(settings$checkpoint)) {
+          "After a fix, the same call resumes from the checkpoints."
+        }
       )
     }
   )
@@ -82,13 +84,13 @@ train_seeds <- function(in_env, settings, seeds, files, progress, client, call) 
 }
 
 # Show each message once for all seeds. The error of a run of a sweep is its result.
-train_seed <- function(run, with_env, client, call) {
+train_seed <- function(run, in_env, client, call) {
   if (isTRUE(run$keeps_error)) {
     run$keeps_error <- FALSE
-    return(tryCatch(train_seed(run, with_env, client, call), error = identity))
+    return(tryCatch(train_seed(run, in_env, client, call), error = identity))
   }
   withCallingHandlers(
-    do_run(run, with_env, NULL, client, progress = FALSE, call),
+    do_run(run, in_env, client, progress = FALSE, call),
     gym_message_interrupted = rlang::cnd_muffle,
     gym_message_resumed = rlang::cnd_muffle,
     gym_message_remembers = rlang::cnd_muffle
@@ -155,7 +157,7 @@ workers_of_plan <- function(plan) {
 
 # A future for each seed. Results are kept in the order of the seeds.
 train_in_futures <- function(vector_env, runs, keep, call) {
-  recipe <- training_recipe(vector_env, runs[[1L]]$settings)
+  recipe <- training_recipe(vector_env, runs[[1L]])
   versions <- server_versions(vector_env$client)
   task <- function(number) {
     new_worker_task("training", recipe, versions, run = runs[[number]])
@@ -165,31 +167,31 @@ train_in_futures <- function(vector_env, runs, keep, call) {
 
 #' @exportS3Method
 run_task.gym_task_training <- function(task) {
-  settings <- task$run$settings
+  settings <- task$run
   # The plan already uses the cores.
   if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
-  with_env <- function(play, max_steps) {
+  in_env <- function(play) {
     with_training_env(settings, function(vector_env) {
       check_worker_gymnasium(task, vector_env$client)
       play(vector_env)
-    }, NULL, gym_client(), call)
+    }, gym_client(), call, NULL)
   }
-  train_seed(task$run, with_env, gym_client(), call)
+  train_seed(task$run, in_env, gym_client(), call)
 }
 
-# What differs between seeds: the settings, the checkpoint, the folder of the log.
-run_of_seed <- function(settings, seed, files, call) {
+# What differs between seeds: the seed, the checkpoint, the folder of the log.
+settings_of_seed <- function(settings, seed, call) {
   settings$seed <- seed
-  text <- format(seed, scientific = FALSE)
-  if (!is.null(files$checkpoint)) {
-    end <- regexpr("([.][^./\\\\]+)?$", files$checkpoint)
-    files$checkpoint <- paste0(
-      substr(files$checkpoint, 1L, end - 1L), "-", text, substring(files$checkpoint, end)
+  if (!is.null(settings$checkpoint)) {
+    file <- settings$checkpoint
+    end <- regexpr("([.][^./\\\\]+)?$", file)
+    settings$checkpoint <- paste0(
+      substr(file, 1L, end - 1L), "-", format(seed, scientific = FALSE), substring(file, end)
     )
   }
-  if (!is.null(files$log)) files$log <- folder_of_seed(files$log, seed)
-  new_run(settings, files, call)
+  if (!is.null(settings$log)) settings$log <- folder_of_seed(settings$log, seed)
+  with_checkpoint(settings, call)
 }
 
 folder_of_seed <- function(folder, seed) {

@@ -86,7 +86,7 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   check_unique_names(x, arg, call)
 }
 
-# In JSON the last of them would silently win.
+# JSON would silently keep only the last of them.
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {

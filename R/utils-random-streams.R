@@ -45,12 +45,11 @@ new_generator <- function(seed, stream = seed_stream(seed)) {
 #'
 #' The generator continues where it was, and the session's is restored.
 #' @noRd
-with_generator <- function(generator, code) keep_random_state(draw_from(generator, code))
-
-draw_from <- function(generator, code) {
-  assign(".Random.seed", generator$state, envir = globalenv())
-  on.exit(generator$state <- globalenv()$.Random.seed)
-  code
+with_generator <- function(generator, code) {
+  keep_random_state({
+    assign(".Random.seed", generator$state, envir = globalenv())
+    tryCatch(code, finally = generator$state <- globalenv()$.Random.seed)
+  })
 }
 
 #' Run code and restore R's generator

@@ -16,13 +16,13 @@ small_policy <- function(output = NA) {
                  output = output, init = "orthogonal")
 }
 
-test_that("a training that was cut goes on bit for bit, the memory of DQN appended", {
+test_that("a training that was cut goes on bit for bit, DQN with its memory", {
   skip_unless_all()
   skip_if_no_server()
   agents <- list(
     agent_reinforce(batch_steps = 200, learning_rate = schedule_linear(0.02, 0, 5000)),
     agent_ppo(batch_steps = 200, batch = 50, epochs = 2, normalize_rewards = TRUE),
-    # Three episodes fill the memory, so its files are changed several times.
+    # Three episodes fill the memory, so its oldest steps are overwritten several times.
     agent_dqn(memory = 60, learning_starts = 50, batch = 8, updates_per_step = 0.3,
               target_every = 20)
   )
@@ -41,39 +41,13 @@ test_that("a training that was cut goes on bit for bit, the memory of DQN append
     same_training(learn(9, checkpoint = file), whole)
     expect_false(identical(coef(learn(8)), coef(whole)))
   }
-  files <- memory_files(file)
-  expect_identical(sum(file.size(files)) %% (8 * 11), 0)
-  expect_lte(sum(file.size(files)), 8 * 11 * 60 * 4)
-  unlink(files)
-  expect_error(learn(10, checkpoint = file), "missing or damaged", class = "gym_error_checkpoint")
 })
 
-test_that("processes with one checkpoint leave each other's memory alone", {
-  path <- withr::local_tempfile(fileext = ".rds")
-  # So many steps that the memory is overwritten again and again.
-  grown <- function(agent, n, of) {
-    agent$memory <- add_to_memory(agent$memory, matrix(of + seq_len(3 * n), 3))
-    agent
-  }
-  kept <- function(agent) restore_memory(agent, path)$memory
-  one <- two <- list(memory = new_memory(10))
-  write_one <- memory_writer(path)
-  write_two <- memory_writer(path)
-  for (n in c(4, 9, 1, 25, 10, 3)) {
-    one <- grown(one, n, 100)
-    two <- grown(two, n + 2, 5000)
-    of_one <- write_one(one)
-    of_two <- write_two(two)
-    expect_identical(kept(of_one), one$memory)
-    expect_identical(kept(of_two), two$memory)
-  }
-  # Files of a process that has long written nothing are removed, and written again by it.
-  Sys.setFileTime(memory_files(path, of_one$memory$key), Sys.time() - 3600)
-  memory_writer(path, of_two$memory$key)
-  expect_identical(memory_files(path, of_one$memory$key), character())
-  one <- grown(one, 2, 0)
-  expect_identical(kept(write_one(one)), one$memory)
-  expect_identical(kept(of_two), two$memory)
+test_that("a checkpoint whose memory is in other files is refused in words", {
+  file <- withr::local_tempfile(fileext = ".rds")
+  write_checkpoint(file, list(training = list(agent = list(memory = list(room = 1024)))))
+  expect_error(read_checkpoint(file, NULL), "keeps its memory in other files",
+               class = "gym_error_checkpoint")
 })
 
 # An agent in an environment with one number and two actions, whose networks give 10 for everything.
@@ -222,7 +196,7 @@ test_that("the gradient of PPO's loss is that of central differences, clipped or
       action = if (gaussian) matrix(rnorm(2 * n), 2) else sample.int(2, n, TRUE),
       advantage = rnorm(n), return = rnorm(n)
     )
-    played <- ppo_forward(policy, value, weights, batch$inputs, batch$action)$draws$log_prob
+    played <- forward_draws(policy, weights, batch$inputs, batch$action)$draws$log_prob
     batch$log_prob <- played + rnorm(n, sd = 0.4)
     settings <- agent_ppo(entropy = 0.1, clip = 0.3)
     found <- ppo_gradient(policy, value, weights, batch, settings)
@@ -348,7 +322,7 @@ test_that("advantages are those of the definition, over episodes that end in eit
   gamma <- 0.9
   lambda <- 0.7
   after <- next_values(value, last_value, terminated, last)
-  found <- estimate_advantages(reward, value, after, last, gamma, lambda)
+  found <- sum_backwards(reward + gamma * after - value, gamma * lambda, last)
   # Schulman et al. (2016), equation 16: the sum of (gamma lambda)^l delta, to the episode's end.
   for (own in split(seq_along(reward), episode)) {
     n <- length(own)

@@ -1,5 +1,5 @@
 test_that("every preset makes its agent, and says where it comes from", {
-  presets <- own_presets()
+  presets <- read_presets()
   expect_identical(anyDuplicated(presets[c("env_id", "kwargs", "agent")]), 0L)
   expect_true(all(nzchar(presets$source[presets$origin == "paper"])))
   expect_true(all(presets$origin %in% c("paper", "ours")))

@@ -93,7 +93,7 @@ test_that("what cannot go on is refused: a kept part of another kind, an ended s
 
 test_that("another agent starts with the policy that draws; a policy alone starts again", {
   first <- quick(agent_ppo(20, batch = 10), one_step())
-  expect_identical(starting_policy(first, agent_reinforce()), first$agent$policy)
+  expect_identical(policy_to_train(first, agent_reinforce()), first$agent$policy)
   expect_s3_class(quick(agent_reinforce(20), one_step(), policy = first), "gym_training")
   again <- quick(first$agent, one_step(), policy = agent_policy(first$agent))
   expect_identical(again$agent$steps, again$steps)
