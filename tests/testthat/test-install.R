@@ -1,7 +1,7 @@
 # What the package's own tests cannot do without the network is in one test, so that packages are
 # downloaded once.
 
-test_that("an installation runs the server, takes extras and repairs itself", {
+test_that("an installation runs the server, takes extras, repairs itself and is shared", {
   skip_unless_all()
   # The server of all tests is not to be one of those that are installed here.
   test_client()
@@ -31,7 +31,7 @@ test_that("an installation runs the server, takes extras and repairs itself", {
   expect_identical(installed_server()$extras, "box2d")
 
   # Without a network: a file of a package that nothing imports, the Python, a package, and then
-  # another place. uv's cache has it all.
+  # another place, by two sessions at once. uv's cache has it all.
   withr::local_envvar(UV_OFFLINE = "1")
   typed <- installed_file(python, "flask/py.typed")
   unlink(typed)
@@ -44,18 +44,10 @@ test_that("an installation runs the server, takes extras and repairs itself", {
   expect_identical(suppressMessages(gym_server_install()), python)
   expect_identical(installed_server()$extras, "box2d")
   withr::local_envvar(R_USER_CACHE_DIR = withr::local_tempdir())
-  suppressMessages(gym_server_install("box2d"))
-  expect_null(environment_problem(installed_server()$python))
-})
-
-test_that("sessions that install at once share the environment", {
-  skip_unless_all()
-  local_cache()
-  skip_if_no_packages()
-  sessions <- lapply(c("box2d", "box2d"), function(extra) {
+  sessions <- lapply(1:2, function(i) {
     processx::process$new(
-      file.path(R.home("bin"), "Rscript"),
-      c("-e", paste0("cat(gym::gym_server_install('", extra, "'))")), stdout = "|", stderr = "2>&1",
+      file.path(R.home("bin"), "Rscript"), c("-e", "cat(gym::gym_server_install('box2d'))"),
+      stdout = "|", stderr = "2>&1",
       env = c("current", R_LIBS = paste(.libPaths(), collapse = .Platform$path.sep))
     )
   })

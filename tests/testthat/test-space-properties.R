@@ -2,7 +2,7 @@ test_that("values that are drawn belong to their space and come back through JSO
   skip_unless_all()
   withr::local_seed(4)
   tried <- 0L
-  for (i in 1:150) {
+  for (i in 1:60) {
     space <- new_space(random_description())
     for (j in 1:3) {
       value <- space_sample(space)
@@ -13,14 +13,14 @@ test_that("values that are drawn belong to their space and come back through JSO
       tried <- tried + 1L
     }
   }
-  expect_identical(tried, 450L)
+  expect_identical(tried, 180L)
 })
 
 test_that("values that are drawn come back through tensors", {
   skip_unless_all()
   withr::local_seed(5)
   tried <- 0L
-  while (tried < 200L) {
+  while (tried < 100L) {
     space <- new_space(random_description())
     if (!has_tensors(space)) next
     value <- space_sample(space)

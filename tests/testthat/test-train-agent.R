@@ -145,25 +145,25 @@ test_that("a training ends when its steps are used up, or its callback says so",
 
 test_that("a training goes on from the file of any iteration to an undisturbed one's result", {
   skip_unless_all()
-  make <- list(
-    function() fake_environment(reward = first_action),
-    function() fake_vector_env(2, "sync", reward = first_action),
-    function() fake_vector_env(7, "vector_entry_point", reward = first_action)
-  )
-  for (agent in some_agents()) {
-    for (env in make) {
-      play <- function(checkpoint = NULL) {
-        quiet_training(agent, iterations = 5, target = Inf, checkpoint = checkpoint, env = env())
-      }
-      undisturbed <- what_counts(play())
-      kept <- local_kept_files()
-      expect_identical(what_counts(play(local_checkpoint())), undisturbed)
-      expect_length(kept$list, 7)
-      for (bytes in kept$list) {
-        expect_identical(what_counts(play(local_checkpoint(bytes))), undisturbed)
-      }
+  single <- function() fake_environment(reward = first_action)
+  each <- function() fake_vector_env(2, "sync", reward = first_action)
+  together <- function() fake_vector_env(7, "vector_entry_point", reward = first_action)
+  goes_on <- function(agent, env) {
+    play <- function(checkpoint = NULL) {
+      quiet_training(agent, iterations = 5, target = Inf, checkpoint = checkpoint, env = env())
+    }
+    undisturbed <- what_counts(play())
+    kept <- local_kept_files()
+    expect_identical(what_counts(play(local_checkpoint())), undisturbed)
+    expect_length(kept$list, 7)
+    for (bytes in kept$list) {
+      expect_identical(what_counts(play(local_checkpoint(bytes))), undisturbed)
     }
   }
+  agents <- some_agents()
+  for (env in list(single, each, together)) goes_on(agents$ars, env)
+  goes_on(agents$cem, each)
+  goes_on(agents$hill, single)
 })
 
 test_that("a larger budget goes on where a smaller one has ended", {
