@@ -77,15 +77,15 @@ test_that("more frames than a GIF can show at that pace are left out, with a mes
   expect_silent(animation_plan(101, fps = 50, every = 1))
 })
 
-test_that("a 200-step CartPole stays well under a megabyte", {
+test_that("a picture of CartPole takes less than 2.5 kB in its animation", {
   skip_unless_all()
   skip_if_not_installed("magick")
   balance <- function(observation) as.integer(observation[, 3] + observation[, 4] > 0)
-  played <- rollout("CartPole-v0", balance, seed = 2, frames = TRUE, client = test_client())
-  expect_identical(played$episodes$length, 200L)
+  played <- rollout("CartPole-v1", balance, seed = 2, max_steps = 50, frames = TRUE,
+                    client = test_client())
   animation <- animate(played)
-  expect_length(animation$steps, 201)
-  expect_lt(file.size(animation$file), 5e5)
+  expect_length(animation$steps, 51)
+  expect_lt(file.size(animation$file), 51 * 2500)
 })
 
 test_that("an episode can be chosen", {
@@ -222,7 +222,6 @@ test_that("an animation whose file has gone is drawn again from its stills, and 
   page <- knitted(animation, "html")
   expect_identical(page$text, knitted(again, "html")$text)
   expect_identical(tools::md5sum(page$files)[[1]], tools::md5sum(again$file)[[1]])
-  expect_match(knitted(animation, "latex")$files, "[.]pdf$")
 })
 
 test_that("it is printed also where it cannot be opened", {

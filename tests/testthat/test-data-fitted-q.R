@@ -128,7 +128,7 @@ test_that("the frozen lake is solved from random play", {
   expect_equal(q$value, as.vector(t(solved$q[as.character(unique(q$position)), ])),
                tolerance = 1e-8)
   # A linear model with a coefficient for each state is the same table.
-  linear <- learn_fitted_q(played, ~ action * factor(position), discount = 0.95, iterations = 1000)
+  linear <- learn_fitted_q(played, ~ action * factor(position), discount = 0.95, iterations = 400)
   expect_equal(state_values(linear, actions = TRUE)$value, q$value, tolerance = 1e-6)
   # It does as well in the lake as the best policy.
   lake <- env_model("FrozenLake-v1", client = test_client())
