@@ -117,7 +117,9 @@
 #' @concept SAC TD3 A2C PyTorch
 #' @export
 #' @examplesIf gym:::can_start_server() && gym:::has_sb3()
-#' trained <- learn_sb3("SAC", "Pendulum-v1", total_steps = 300, eval_episodes = 10, seed = 1)
+#' trained <- learn_sb3(
+#'   "SAC", "Pendulum-v1", total_steps = 300, eval_episodes = 10, eval_episodes_curve = 0, seed = 1
+#' )
 #' trained
 #' predict(trained, c(1, 0, 0))
 learn_sb3 <- function(algorithm, env, total_steps = NULL, ..., policy = NULL,

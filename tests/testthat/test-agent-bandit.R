@@ -28,7 +28,7 @@ test_that("the testbed's curves are those of the book", {
   # epsilon 0.1 about 1.4 and the best arm in four fifths of the cases.
   testbed <- bandit(arms = 10)
   late <- function(...) {
-    utils::tail(learn_bandit(testbed, ..., seed = 1)$curve, 100)
+    utils::tail(learn_bandit(testbed, ..., learners = 500, seed = 1)$curve, 100)
   }
   greedy <- late(epsilon = 0)
   explores <- late(epsilon = 0.1)

@@ -2,19 +2,22 @@
 # the server for R, and in process by reference_trajectories.py, with the same seed
 # and actions. The observations, rewards, flags and frames are compared byte by byte.
 #
-# Of the hundreds of Atari games, which all observe large pictures, one in twenty plays 20 steps,
-# and the others play 30; `make test` has a sixth of these play 10. With GYM_TEST_PARITY=all, as
-# `make soak` has it, every environment plays 200. (The server's test_environments.py makes,
-# resets, steps and draws every game.)
+# All Atari games observe large pictures, and all robots long vectors: one game in forty plays 20
+# steps, and one robot in three 30, as all others do; `make test` has a sixth of these play 10. With
+# GYM_TEST_PARITY=all, as `make soak` has it, every environment plays 200. (The server's
+# test_environments.py makes, resets, steps and draws games and others.)
 
 registered <- utils::read.csv(test_path("environments.csv"), na.strings = "")
 played <- registered[is.na(registered$why_not), ]
 if (soaks("GYM_TEST_PARITY")) {
   played$steps <- 200L
 } else {
-  atari <- which(played$family == "atari")
   played$steps <- if (tests_all()) ifelse(played$family == "atari", 20L, 30L) else 10L
-  played <- played[-atari[seq_along(atari) %% 20L != 1L], ]
+  every <- c(atari = 40L, mujoco = 3L)
+  for (family in names(every)) {
+    alike <- which(played$family == family)
+    played <- played[-alike[seq_along(alike) %% every[[family]] != 1L], ]
+  }
   if (!tests_all()) played <- played[seq_len(nrow(played)) %% 6L == 1L, ]
 }
 played$file <- sprintf("%04d", seq_len(nrow(played)))
