@@ -82,7 +82,7 @@ sb3_evaluations <- function(folder) {
 
 #' Make the result of a training
 #' @param settings The settings of the training, see [learn_sb3()].
-#' @param result As returned by [run_sb3_job()]. `NULL` if it ended without one.
+#' @param result As returned by [run_sb3_job()].
 #' @noRd
 sb3_training <- function(settings, folder, result, client, call) {
   history <- sb3_history(sb3_progress(folder))

@@ -35,10 +35,8 @@ def keep(model: BaseAlgorithm, folder: Path, rows: int, elapsed: float) -> None:
     buffer = _buffer_of(model)
     if buffer is not None and sum(array.nbytes for array in buffer.values()) <= LARGEST_BUFFER:
         np.savez(new / "buffer.npz", **buffer)
-    if (env := model.get_vec_normalize_env()) is not None:
-        for name in ("obs_rms", "ret_rms"):
-            found: Any = getattr(env, name)
-            np.savez(new / f"{name}.npz", mean=found.mean, var=found.var, count=found.count)
+    for name, found in _moments_of(model).items():
+        np.savez(new / f"{name}.npz", mean=found.mean, var=found.var, count=found.count)
     state = {name: getattr(model, name) for name in _COUNTERS if hasattr(model, name)}
     files.write_json(new / "state.json", {**state, "rows": rows, "elapsed": elapsed})
     shutil.rmtree(old, ignore_errors=True)
@@ -55,6 +53,12 @@ def _buffer_of(model: BaseAlgorithm) -> dict[str, Any] | None:
     filled = buffer.buffer_size if buffer.full else buffer.pos
     arrays = {name: getattr(buffer, name)[:filled] for name in _ARRAYS if hasattr(buffer, name)}
     return {**arrays, "pos": np.array(buffer.pos), "full": np.array(buffer.full)}
+
+
+def _moments_of(model: BaseAlgorithm) -> dict[str, Any]:
+    # Observations have some if they are normalized, the returns always.
+    env = model.get_vec_normalize_env()
+    return {name: getattr(env, name) for name in ("obs_rms", "ret_rms") if hasattr(env, name)}
 
 
 def _place(folder: Path) -> Path | None:
@@ -102,12 +106,10 @@ def _restore(model: BaseAlgorithm, place: Path, state: dict[str, Any]) -> None:
     for name, value in state.items():
         if name in _COUNTERS:
             setattr(model, name, value)
-    if (env := model.get_vec_normalize_env()) is not None:
-        for name in ("obs_rms", "ret_rms"):
-            with np.load(place / f"{name}.npz", allow_pickle=False) as saved:
-                found: Any = getattr(env, name)
-                found.mean, found.var = saved["mean"], saved["var"]
-                found.count = float(saved["count"])
+    for name, found in _moments_of(model).items():
+        with np.load(place / f"{name}.npz", allow_pickle=False) as saved:
+            found.mean, found.var = saved["mean"], saved["var"]
+            found.count = float(saved["count"])
     buffer: Any = getattr(model, "replay_buffer", None)
     if buffer is not None and (place / "buffer.npz").exists():
         with np.load(place / "buffer.npz", allow_pickle=False) as saved:

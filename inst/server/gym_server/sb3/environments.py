@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import inspect
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box
 from gymnasium.wrappers import FrameStackObservation, ReshapeObservation
 from stable_baselines3.common.atari_wrappers import AtariWrapper
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecNormalize
 
 from gym_server.envs import wrappers
 from gym_server.envs.config import Wrapper
@@ -71,6 +73,26 @@ def vector_env(job: dict[str, Any]) -> VecEnv:
     """Return a vector environment of Stable-Baselines3 for training."""
     made: VecEnv = DummyVecEnv([lambda: single_env(job, trains=True)] * job["num_envs"])
     return made
+
+
+def normalized(env: VecEnv, job: dict[str, Any], discount: float) -> VecEnv:
+    """Return the vector environment as the job's ``normalize`` wants it."""
+    if not job["normalize"]:
+        return env
+    chosen = job["normalize"] if isinstance(job["normalize"], dict) else {}
+    known = set(inspect.signature(VecNormalize).parameters) - {"venv", "training", "norm_obs_keys"}
+    for name in chosen:
+        if name not in known:
+            message = f'VecNormalize has no argument "{name}".'
+            raise JobError(message, argument="normalize", known=sorted(known))
+    if chosen.get("norm_obs", True) and not isinstance(env.observation_space, Box):
+        kind = type(env.observation_space).__name__
+        raise JobError(
+            f"The observations of {job['env_id']} are a {kind}, and only a Box is normalized.",
+            "`normalize = list(norm_obs = FALSE)` normalizes the rewards alone.",
+            argument="normalize",
+        )
+    return VecNormalize(env, **{"gamma": discount, **chosen})
 
 
 def has_limit(job: dict[str, Any]) -> bool:

@@ -142,13 +142,14 @@ def _with_outputs(weights: Weights, hidden: str, outputs: str) -> dict[str, np.n
 
 
 def _actor_critic(weights: Weights, actions: int | None, hidden: str, squashes: bool) -> Network:
-    if "mlp_extractor.shared_net.0.weight" in weights:
-        raise NotANetworkError("its first layers are shared by policy and values")
     deviation = weights.get("log_std")
     network = Network("softmax" if actions is not None else "gaussian", log_std=deviation)
     # With state-dependent exploration the deviations depend on the observation.
     if squashes or (deviation is not None and deviation.ndim > 1):
         network.output, network.log_std = "greedy", None
+    # Until its version 1.7 Stable-Baselines3 had layers that policy and values share.
+    if shared := _part(weights, "mlp_extractor.shared_net."):
+        _stack(network, shared, hidden, hidden)
     part = _with_outputs(weights, "mlp_extractor.policy_net.", "action_net.")
     return _stack(network, part, hidden, "tanh" if squashes else "identity")
 

@@ -18,11 +18,17 @@ from gymnasium.spaces import Box
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from stable_baselines3.common.vec_env import VecEnv
 
 from gym_server.rollouts.episode import play_episode
 from gym_server.sb3 import algorithms, checkpoints, policies
-from gym_server.sb3.environments import has_limit, preprocessing, single_env, vector_env
+from gym_server.sb3.environments import (
+    has_limit,
+    normalized,
+    preprocessing,
+    single_env,
+    vector_env,
+)
 from gym_server.sb3.failures import JobError, diverged, in_words
 
 # Where an environment has no limit of its own, a policy may never end an episode.
@@ -52,9 +58,7 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
     env = vector_env(job)
     treated = preprocessing(job, env)
     arguments = algorithms.arguments_of(make, job["arguments"], env.action_space)
-    if job["normalize"]:
-        chosen = job["normalize"] if isinstance(job["normalize"], dict) else {}
-        env = VecNormalize(env, **{"gamma": arguments.get("gamma", 0.99), **chosen})
+    env = normalized(env, job, arguments.get("gamma", 0.99))
     before = checkpoints.state_of(folder)
     begun = before.get("num_timesteps", 0)
     model = _model(make, env, arguments, job, job["seed"] + begun)
@@ -77,10 +81,8 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
     return {
         "steps": model.num_timesteps,
         "begun": begun,
-        "complete": error is None and model.num_timesteps >= job["total_steps"],
         "error": error,
         "device": str(model.device),
-        "processor_seconds": time.process_time(),
         "versions": versions(),
         "preprocessing": treated,
     }
@@ -102,6 +104,9 @@ def _model(
     named: dict[str, Any] = {"seed": seed % 2**31, "device": job["device"], **arguments}
     try:
         return make(job["policy"], env, **named)
+    except NotImplementedError as failure:
+        message = f"{make.__name__} cannot train in {job['env_id']}: {failure}."
+        raise JobError(message, argument="env") from failure
     except (AssertionError, TypeError, ValueError) as failure:
         text = " ".join(str(failure).split())
         if "only supports" in text and "action space" in text:
@@ -123,7 +128,8 @@ def _model(
                 '"MlpPolicy" is for numbers, "MultiInputPolicy" for a Dict of several parts.',
                 argument="policy",
             ) from failure
-        raise JobError(f"{make.__name__} refuses its arguments: {text}") from failure
+        message = f"{make.__name__} refuses its arguments: {text}"
+        raise JobError(message, argument="...") from failure
 
 
 class _Callback(BaseCallback):

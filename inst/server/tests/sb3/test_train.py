@@ -34,6 +34,11 @@ JOB = {
     "checkpoint": False,
 }
 
+OF_PARTS = {
+    "policy": "MultiInputPolicy",
+    "wrappers": [{"name": "TimeAwareObservation", "kwargs": {"flatten": False}}],
+}
+
 
 def train(folder, **changes):
     from gym_server.sb3.train import train as run
@@ -85,7 +90,11 @@ def has_gpu():
         ({"device": "cuda"}, "device", "no GPU"),
         ({"algorithm": "MaskablePPO"}, "algorithm", "does not say which actions are valid"),
         ({"policy": "CnnPolicy"}, "policy", "pictures"),
-        ({"env_id": "Blackjack-v1"}, None, "not supported"),
+        ({"env_id": "Blackjack-v1"}, "env", "cannot train in Blackjack-v1"),
+        ({"arguments": {"n_steps": -1}}, "...", "refuses its arguments"),
+        ({"env_id": "Taxi-v4", "normalize": True}, "normalize", "are a Discrete"),
+        ({**OF_PARTS, "normalize": True}, "normalize", "are a Dict, and only a Box"),
+        ({"normalize": {"gama": 0.9}}, "normalize", "no argument"),
     ],
 )
 def test_what_is_wrong_is_said_before_anything_is_trained(
@@ -116,20 +125,24 @@ def test_a_loss_that_is_nan_ends_the_training_and_finite_weights_are_kept(tmp_pa
     arguments = {**JOB["arguments"], "learning_rate": 1e30}
     result = child(train, tmp_path, total_steps=2000, arguments=arguments)
     assert "NaN" in result["error"]["message"]
-    assert not result["complete"]
     read = safetensors.read((tmp_path / "policy.safetensors").read_bytes())
     assert all(np.isfinite(tensor.array()).all() for tensor in read.tensors.values())
 
 
-def test_memory_that_does_not_suffice_is_said_in_words(child):
-    said = child(in_words, MemoryError("Unable to allocate 1.5 TiB"))
-    assert "The memory does not suffice" in said["message"]
-    assert "buffer_size" in said["hint"]
+def test_memory_that_does_not_suffice_is_said_in_words_and_the_steps_are_kept(tmp_path, child):
+    arguments = {"learning_starts": 50, "buffer_size": 1000, "batch_size": 10**14}
+    result = child(train, tmp_path, algorithm="DQN", arguments=arguments)
+    assert "The memory does not suffice" in result["error"]["message"]
+    assert "batch_size" in result["error"]["hint"]
+    assert result["steps"] > 50
+    assert (tmp_path / "policy.safetensors").exists()
 
 
 def test_a_training_goes_on_with_its_weights_steps_and_buffer(tmp_path, child):
     off_policy = {"learning_starts": 50, "buffer_size": 1000}
     changes = {"algorithm": "DQN", "arguments": off_policy, "checkpoint": True}
+    # Without moments of observations.
+    changes["normalize"] = {"norm_obs": False}
     assert child(train, tmp_path, **changes)["begun"] == 0
     assert child(steps_of, tmp_path) == 200
     with np.load(tmp_path / "checkpoint" / "buffer.npz") as buffer:
