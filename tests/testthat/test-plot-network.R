@@ -110,7 +110,7 @@ test_that("any network is drawn, positive weights solid and negative ones dashed
   left <- ggplot2::ggplot_build(picture)$layout$panel_params[[1]]$y$get_labels()
   expect_identical(sort(left), paste0("obs_", 1:4))
   drawn(autoplot(policy_network(c(1, 1))))
-  drawn(autoplot(policy_network(c(100, 50, 20, 18)), neurons = 30, digits = 3))
+  drawn(autoplot(policy_network(c(30, 15, 10)), neurons = 8, digits = 3))
   drawn(autoplot(policy_network(c(2, 1), weights = list(matrix(0, 1, 2)))))
 })
 
