@@ -206,8 +206,7 @@ observation_bytes <- function(space) {
 #' Make an environment with sub-environments, or without any if the server cannot make them
 #'
 #' @param make A function that makes it, of the number of sub-environments and how they run.
-#' @param described As returned by [known_description()]. A server that does not report the size of
-#'   observations refuses more sub-environments than it can make.
+#' @param described As returned by [known_description()].
 #' @return A list: `env`, the environment, and `batch_size`, the number of episodes in a batch if
 #'   each sub-environment has its own seed.
 #' @noRd
@@ -281,7 +280,7 @@ if_supported <- function(code) {
 #'   that share a seed if all sub-environments have one generator (or `NULL`), `processes`, the
 #'   number that play, `needs_max_steps`, whether an episode may go on forever, `versions` and
 #'   `processor`. `NULL` if R plays its episodes: an environment in R or an object, frames, wrappers
-#'   that remember earlier episodes, arguments about sub-environments, an older server.
+#'   that remember earlier episodes, arguments about sub-environments.
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
@@ -304,19 +303,11 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
 
 # The server's description of an environment, `NULL` if it does not play it itself.
 known_description <- function(client, env_id, arguments, call) {
-  if (!plays_rollouts(client, call)) {
-    return(NULL)
-  }
-  # What is known about an environment of one version of the server, as long as the client lives.
-  state <- client_state(client)
-  state$known_envs <- state$known_envs %||% new.env(parent = emptyenv())
-  key <- rlang::hash(list(env_id, if (length(arguments)) arguments, server_versions(client)))
-  known <- state$known_envs[[key]] %||% new.env(parent = emptyenv())
-  state$known_envs[[key]] <- known
-  known$described <- known$described %||% list(ask_description(client, env_id, arguments, call))
-  described <- known$described[[1L]]
-  if (!is.null(described)) described$known <- known
-  described
+  described <- client_state(client)$described
+  key <- rlang::hash(list(env_id, if (length(arguments)) arguments))
+  described[[key]] <- described[[key]] %||%
+    list(ask_description(client, env_id, arguments, call))
+  described[[key]][[1L]]
 }
 
 # The names of arguments that do not belong to the environment.
@@ -357,7 +348,7 @@ ask_description <- function(client, env_id, arguments, call) {
   observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
   num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
   spec <- read_spec(answer$env_id, answer$spec)
-  new_vector_env(
+  vector_env <- new_vector_env(
     observed, read_space(answer, "action_space"),
     c(spec, list(wrappers = wrapper_names(wrappers), kwargs = arguments)),
     num_envs, episodes_of_batch(num_envs), one_seed = !is.null(answer$group), client = client,
@@ -367,6 +358,9 @@ ask_description <- function(client, env_id, arguments, call) {
       versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
     )
   )
+  # How many episodes its last request had, see play_requests().
+  vector_env$known <- new.env(parent = emptyenv())
+  vector_env
 }
 
 rollouts_route <- "/v1/rollouts/"

@@ -30,7 +30,7 @@ with_answer <- function(response) {
 parsed_body <- function(response) {
   if (response$status_code == 204L) {
     NULL
-  } else if (is_tensors_type(response$type)) {
+  } else if (isTRUE(response$type %in% c(tensors_type, column_tensors_type))) {
     tensors_answer(response$content, response$type == column_tensors_type)
   } else if (identical(response$type, "image/png")) {
     list(png = response$content)
@@ -68,7 +68,3 @@ tensors_answer <- function(bytes, by_column) {
 }
 
 empty_object <- structure(list(), names = character())
-
-is_tensors_type <- function(type) {
-  identical(type, tensors_type) || identical(type, column_tensors_type)
-}

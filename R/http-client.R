@@ -62,7 +62,8 @@ client_state <- function(client) {
       state$session_config <- getOption("httr_config")
       state$instances <- new.env(parent = emptyenv())
       state$to_close <- character()
-      state$health <- NULL
+      state$versions <- NULL
+      state$described <- new.env(parent = emptyenv())
       # The process in which the client was first used.
       state$made_in <- state$made_in %||% state$pid %||% Sys.getpid()
       state$pid <- Sys.getpid()
@@ -77,20 +78,14 @@ client_state <- function(client) {
   state
 }
 
-# Makes a source of idempotency keys, by which the server recognises a repeated request: a random
-# text, and the number of the last request.
-new_idempotency_keys <- function() {
-  keys <- new.env(parent = emptyenv())
-  keys$key <- random_key()
-  keys$number <- 0
-  keys
-}
-
-# The keys that all clients and objects of one server, or of one instance, share, because numbers
-# must grow. A forked process has others.
+# The idempotency keys by which the server recognises a repeated request: a random text, and the
+# number of the last request. All clients and objects of one server, or of one instance, share
+# them, because numbers must grow. A forked process has others.
 keys_of_place <- function(place) {
   place <- paste(place, Sys.getpid())
-  the_session$keys[[place]] %||% (the_session$keys[[place]] <- new_idempotency_keys())
+  the_session$keys[[place]] %||% (
+    the_session$keys[[place]] <- rlang::env(key = random_key(), number = 0)
+  )
 }
 
 # The idempotency key of the next request, for its field `request`.
@@ -108,27 +103,14 @@ random_key <- function() {
   ))
 }
 
-# The server's description of itself, a named list; `NULL` without such a route or without a client.
-# It is requested once.
-server_health <- function(client, call = rlang::caller_env()) {
+# The versions of the server, its Python and its Gymnasium, a named list: requested once. `NULL`
+# without a client, or if there is no answer.
+server_versions <- function(client) {
   if (is.null(client)) {
     return(NULL)
   }
   state <- client_state(client)
-  if (is.null(state$health)) {
-    state$health <- list(tryCatch(
-      get_answer(client, "/v1/health/", call = call), gym_error_http = function(cnd) NULL
-    ))
-  }
-  state$health[[1L]]
-}
-
-# The versions of the server, its Python and its Gymnasium, a named list or `NULL`.
-server_versions <- function(client) {
-  tryCatch(server_health(client)$versions, gym_error = function(cnd) NULL)
-}
-
-# Whether the server plays whole episodes itself. Older ones do not.
-plays_rollouts <- function(client, call = rlang::caller_env()) {
-  isTRUE(server_health(client, call)$rollouts)
+  state$versions <- state$versions %||%
+    tryCatch(get_answer(client, "/v1/health/")$versions, gym_error = function(cnd) NULL)
+  state$versions
 }

@@ -65,14 +65,9 @@ get_answer <- function(client, route, takes_tensors = FALSE, call = rlang::calle
 #'   curl takes as long to set the length as for half a request.
 #' @noRd
 json_body <- function(fields, key = NULL) {
-  bytes <- charToRaw(json_object(c(fields, request = key_json(key))))
+  request <- if (!is.null(key)) sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
+  bytes <- charToRaw(json_object(c(fields, request = request)))
   c(bytes, rep(as.raw(0x20), -length(bytes) %% 64L))
-}
-
-key_json <- function(key) {
-  if (!is.null(key)) {
-    sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
-  }
 }
 
 # Attempts -------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ perform_several <- function(client, route, next_content, received, sends = tenso
 
 send_one <- function(one, several) {
   line <- new_line(several$client)
-  # After `timeout`, check_silent() asks whether the server still works.
+  # After `timeout`, await_outcomes() asks whether the server still works.
   curl::handle_setopt(line$handle, timeout_ms = 0, tcp_keepalive = TRUE)
   set_line(line, "POST", one$content$body, several$sends, accepted_tensors)
   one$sent <- one$heard <- now()
@@ -80,14 +80,10 @@ await_outcomes <- function(several) {
     # While curl connects, or all requests wait to be sent again.
     Sys.sleep(0.002)
   }
-  check_silent(several)
-}
-
-# A request may take long, but a working server answers another one.
-check_silent <- function(several) {
+  # A request may take long, but a working server answers another one.
   for (one in several$under_way) {
-    if (is.null(one$outcome) && now() - one$heard > timeout_of(several$client)) {
-      get_answer(several$client, "/v1/health/", call = several$call)
+    if (is.null(one$outcome) && now() - one$heard > timeout_of(client)) {
+      get_answer(client, "/v1/health/", call = several$call)
       one$heard <- now()
     }
   }

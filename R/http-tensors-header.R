@@ -1,4 +1,4 @@
-# The header of a safetensors file, which locates the tensors. Inconsistent headers are refused.
+# The header of a safetensors file, which locates the tensors.
 
 header_size <- function(bytes) {
   if (length(bytes) < 8L) {
@@ -32,7 +32,13 @@ read_layout <- function(bytes, by_column = FALSE) {
   table <- c(as.raw(by_column), table)
   if (!identical(last_table$bytes, table)) {
     entries <- header_json(table[-1L])
-    last_table$read <- read_table(entries[names(entries) != "__metadata__"], by_column)
+    tensors <- entries[names(entries) != "__metadata__"]
+    if (length(tensors) > most_tensors) {
+      abort_tensors(paste("there are more than", count_of(most_tensors, "tensor")))
+    }
+    tensors <- lapply(tensors, read_entry, by_column)
+    last_table$entries <- tensors[order(vapply(tensors, function(tensor) tensor$begin, 0))]
+    last_table$size <- sum(vapply(tensors, function(tensor) as.double(tensor$size), 0))
     last_table$metadata <- entries[["__metadata__"]]
     last_table$bytes <- table
   }
@@ -41,12 +47,12 @@ read_layout <- function(bytes, by_column = FALSE) {
   } else {
     last_table$metadata
   }
-  read <- last_table$read
-  if (read$size != length(bytes) - data) {
-    abort_tensors(paste("the tensors have", count_of(read$size, "byte"), "and the file",
+  # With as many bytes as the file, tensors take no more memory than it.
+  if (last_table$size != length(bytes) - data) {
+    abort_tensors(paste("the tensors have", count_of(last_table$size, "byte"), "and the file",
                         length(bytes) - data))
   }
-  list(entries = read$entries, data = data, metadata = metadata)
+  list(entries = last_table$entries, data = data, metadata = metadata)
 }
 
 last_table <- new.env(parent = emptyenv())
@@ -58,40 +64,7 @@ header_json <- function(bytes) {
   if (!is_object(json)) {
     abort_tensors("the header is no JSON object")
   }
-  check_entry_names(names(json))
   json
-}
-
-read_table <- function(entries, by_column) {
-  if (length(entries) > most_tensors) {
-    abort_tensors(paste("there are more than", count_of(most_tensors, "tensor")))
-  }
-  entries <- lapply(entries, read_entry, by_column)
-  begins <- vapply(entries, function(entry) entry$begin, 0)
-  sizes <- vapply(entries, function(entry) as.double(entry$size), 0)
-  list(entries = entries[check_filled(begins, begins + sizes)], size = sum(sizes))
-}
-
-check_entry_names <- function(names) {
-  if (!all(nzchar(names))) {
-    abort_tensors("a tensor has no name")
-  }
-  twice <- anyDuplicated(names)
-  if (twice) {
-    abort_tensors(paste("the header has the name", to_json(names[[twice]]), "twice"))
-  }
-}
-
-# Returns the order of the tensors. Overlapping tensors would take more memory than the file, so
-# they must fill the data, one after the other.
-check_filled <- function(begins, ends) {
-  in_order <- order(begins, ends)
-  wrong <- match(FALSE, begins[in_order] == c(0, ends[in_order])[seq_along(begins)])
-  if (!is.na(wrong)) {
-    name <- names(begins)[[in_order[[wrong]]]]
-    abort_tensors(paste("there is a gap or an overlap before the tensor", to_json(name)))
-  }
-  in_order
 }
 
 read_entry <- function(entry, by_column) {

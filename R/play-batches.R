@@ -28,6 +28,7 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 
 #' Play batches until all episodes have been played
 #'
+#' @param vector_env As returned by [env_for_policy()], or by [stepped()] with a learner.
 #' @param history As returned by [new_history()]. After an error or an interrupt it has the batches
 #'   that were played.
 #' @param policy_of A function of the numbers of the candidates of a batch, which returns the policy
@@ -40,11 +41,6 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 play_batches <- function(vector_env, history, policy_of, report = function(ended) NULL, ...,
                          keep_steps = FALSE, learner = NULL, max_steps = Inf) {
   check_has_end(vector_env, max_steps)
-  vector_env <- if (is.null(learner)) {
-    env_for_policy(vector_env, policy_of(seq_len(history$candidates)), max_steps, keep_steps)
-  } else {
-    stepped(vector_env)
-  }
   if (isTRUE(vector_env$apart)) {
     return(play_apart(vector_env, history, policy_of, report, max_steps, keep_steps, ...))
   }

@@ -253,7 +253,7 @@ run_task.gym_task_episodes <- function(task) {
   if (is.null(described)) {
     gym_abort(
       paste0("The server of worker ", Sys.getpid(), " on ", Sys.info()[["nodename"]],
-             " is older than the session's and cannot play whole episodes."),
+             " cannot play whole episodes."),
       class = "gym_error_worker", host = Sys.info()[["nodename"]]
     )
   }

@@ -212,9 +212,9 @@ same_episodes <- function(seed, episodes, max_steps) {
     # episodes.
     playing <- env_for_policy(vector_env, candidates, max_steps %||% Inf)
     if (!playing$one_seed || !is.null(playing$description)) {
-      play(vector_env, candidates, seq_len(count))
+      play(playing, candidates, seq_len(count))
     } else {
-      vapply(seq_len(count), function(one) play(vector_env, candidates, one), 0)
+      vapply(seq_len(count), function(one) play(playing, candidates, one), 0)
     }
   }
 }

@@ -23,8 +23,7 @@
 #' * an environment that was made before or is written in R,
 #' * `frames = TRUE`, and wrappers that remember earlier episodes,
 #' * episodes without a step limit, by the environment or `max_steps`,
-#' * a vector implementation such as CartPole's with a `num_envs` other than 256,
-#' * a server that is older than this package.
+#' * a vector implementation such as CartPole's with a `num_envs` other than 256.
 #'
 #' **By Stable-Baselines3**: a policy of [learn_sb3()] that is no network of R plays whole episodes
 #' in a process of its own.

@@ -123,6 +123,7 @@ play_evaluation <- function(state, vector_env, settings, policy, episodes, final
   history <- new_history(1L, episodes, streams)
   history$draw_seeds <- function(n) as.integer(before + sample.int(half - 1, n, replace = TRUE))
   limit <- evaluation_limit(state, vector_env, settings)
+  vector_env <- env_for_policy(vector_env, policy, limit)
   play_batches(vector_env, history, function(which) policy, max_steps = limit)
   episodes <- episodes_table(history$batches)
   cut_off <- sum(episodes$length >= limit)

@@ -179,7 +179,7 @@ play_iteration <- function(state, vector_env, settings, learner) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
   play_batches(
-    vector_env, history, function(which) NULL, learner = learner,
+    stepped(vector_env), history, function(which) NULL, learner = learner,
     max_steps = settings$max_steps %||% Inf,
     report = function(ended) state$report(history$played_episodes + ended)
   )

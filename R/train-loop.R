@@ -83,17 +83,18 @@ train_iteration <- function(state, vector_env, settings, call) {
   episodes <- agent_episodes(agent, settings$episodes)
   history <- new_history(count_candidates(candidates) %||% 1L, episodes, state$streams)
   if (!settings$search) history$draw_seeds <- draw_training_seeds
+  limit <- settings$max_steps %||% Inf
+  keep_steps <- "trajectories" %in% needs
   play_batches(
-    vector_env, history, function(which) policy_subset(candidates, which),
-    report = function(ended) state$report(history$played_episodes + ended),
-    max_steps = settings$max_steps %||% Inf,
+    env_for_policy(vector_env, candidates, limit, keep_steps), history,
+    function(which) policy_subset(candidates, which),
+    report = function(ended) state$report(history$played_episodes + ended), max_steps = limit,
     # After a candidate has reached the target, the later ones need not be played.
     target = if (settings$search) settings$target,
-    keep_moments = "moments" %in% needs, keep_steps = "trajectories" %in% needs,
-    keep_next = "trajectories" %in% needs
+    keep_moments = "moments" %in% needs, keep_steps = keep_steps, keep_next = keep_steps
   )
   results <- candidate_results(history, asked, call)
-  if ("trajectories" %in% needs) {
+  if (keep_steps) {
     # The steps of all candidates, episode after episode.
     played <- episodes_table(history$batches, several = TRUE)
     steps <- steps_in_order(history$batches, played, vector_env, next_observation = TRUE)
@@ -105,7 +106,7 @@ train_iteration <- function(state, vector_env, settings, call) {
   check_is_agent(agent, "agent_tell()", call)
   episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
   # An agent that learns from steps gets the results of its episodes, not the means of candidates.
-  if ("trajectories" %in% needs) results[c("returns", "lengths")] <- episode_results(history)
+  if (keep_steps) results[c("returns", "lengths")] <- episode_results(history)
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 

@@ -308,7 +308,7 @@ test_that("only who names an environment that is out of date is told so", {
   searched <- function(search, ...) {
     # As if it were asked for the first time.
     state <- client_state(client)
-    state$known_envs <- NULL
+    state$described <- new.env()
     search(..., rounds = 1, episodes = 1, client = client)
   }
   expect_no_warning(searched(search_random, seed = 1))

@@ -464,14 +464,14 @@ test_that("an interrupt keeps what was played before it, and the client goes on"
   expect_identical(play(), whole)
 })
 
-test_that("an older server is played step by step, from the same seeds", {
+test_that("where the server plays no whole episodes R steps, from the same seeds", {
   client <- test_client()
   play <- function() {
     rollout("Acrobot-v1", linear(6, 3), 9, seed = 1, max_steps = 20, client = client)
   }
   beside <- play()
-  local_functions(plays_rollouts = function(...) FALSE)
-  older <- play()
-  expect_identical(way(older), "step by step")
-  expect_equal(older$episodes, beside$episodes)
+  local_functions(known_description = function(...) NULL)
+  stepped <- play()
+  expect_identical(way(stepped), "step by step")
+  expect_equal(stepped$episodes, beside$episodes)
 })

@@ -96,8 +96,8 @@ test_that("a server that describes environments makes no instance to look at", {
   expect_identical(made(), 3L)
 })
 
-test_that("nor does an older one, where all sub-environments have seeds of their own", {
-  local_functions(plays_rollouts = function(...) FALSE)
+test_that("nor does one that plays no whole episodes: sub-environments have their own seeds", {
+  local_functions(known_description = function(...) NULL)
   client <- local_server()
   made <- count_instances()
   for (id in c("FrozenLake-v1", "CartPole-v1")) {

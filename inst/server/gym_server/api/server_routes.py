@@ -66,6 +66,5 @@ def health(call: Call) -> dict:
             "python": platform.python_version(),
         },
         "pid": os.getpid(),
-        "rollouts": True,
         "server": START,
     }

@@ -277,10 +277,6 @@ def test_what_was_finished_before_an_error_is_answered(client):
     assert refused(client, [100 + finished], **how)["code"] == "environment_error"
 
 
-def test_health_says_that_there_are_rollouts(client):
-    assert client.get("/v1/health/").json["rollouts"] is True
-
-
 def test_an_answer_has_no_more_than_so_many_bytes(client, monkeypatch):
     monkeypatch.setattr("gym_server.manager.rollout_request.MOST_BYTES", 20_000)
     how = {"env_id": "Pendulum-v1", "max_steps": 100, "keep": ["steps"]}
