@@ -12,10 +12,10 @@ replay_bandit <- function(data, method, confidence, seed, call) {
   context <- context_regression(steps, call)
   x <- context$block(steps$state)
   # As if all actions had been equally likely.
-  used <- min(steps$probability) / steps$probability
+  chosen <- steps$probability %||% 1
   played <- with_generator(
     new_generator(seed),
-    replay_steps(x, steps, if (length(used)) used else 1, method == "thompson", confidence)
+    replay_steps(x, steps, min(chosen) / chosen, method == "thompson", confidence)
   )
   seen <- length(played$reward)
   abort_if(
@@ -61,7 +61,7 @@ context_regression <- function(steps, call) {
 #' @noRd
 replay_steps <- function(x, steps, used, draws, confidence) {
   width <- ncol(x)
-  many <- length(steps$actions)
+  many <- nrow(steps$actions)
   inverse <- rep(list(diag(width)), many)
   sums <- weights <- matrix(0, width, many)
   used <- stats::runif(nrow(x)) < used
@@ -89,7 +89,7 @@ replay_steps <- function(x, steps, used, draws, confidence) {
       weights[, chosen] <- inverse[[chosen]] %*% sums[, chosen]
     }
   }
-  dimnames(weights) <- list(colnames(x), as.character(steps$actions))
+  dimnames(weights) <- list(colnames(x), row_texts(steps$actions))
   list(reward = steps$reward[seen], weights = weights)
 }
 

@@ -326,9 +326,9 @@ state_values <- function(x, actions = FALSE) {
     states <- all_values(space)
     row <- rep(seq_len(nrow(q)), each = ncol(q))
     actions <- agent$spaces$action_space
-    numbers <- named_numbers(actions, state_numbers(actions)[seq_len(ncol(q))])
+    numbers <- rep(state_numbers(actions)[seq_len(ncol(q))], nrow(q))
     return(data.frame(
-      states[row, , drop = FALSE], action = rep(numbers, nrow(q)), value = as.vector(t(q)),
+      states[row, , drop = FALSE], decoded_actions(actions, numbers), value = as.vector(t(q)),
       row.names = NULL
     ))
   }

@@ -187,7 +187,7 @@ check_pairs <- function(design) {
     return(invisible())
   }
   here <- regression$block(design$steps$state)
-  taken <- matrix(FALSE, nrow(regression$states), length(design$steps$actions))
+  taken <- matrix(FALSE, nrow(regression$states), nrow(design$steps$actions))
   taken[cbind(here, design$steps$action)] <- TRUE
   without <- rowSums(design$act$here * !taken[here, , drop = FALSE])
   share <- mean(without)

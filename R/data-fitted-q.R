@@ -132,11 +132,8 @@ fit_rule <- function(steps, recipe, call) {
 new_rule <- function(regression, fits, steps, recipe) {
   structure(
     list(
-      regression = regression, fits = fits, recipe = recipe, actions = steps$actions,
-      most_taken = which.max(tabulate(steps$action)), keys = episode_keys(steps),
-      states = names(steps$state), seen = steps$state, taken = steps$action,
-      step = steps$step, observation_space = NULL, action_space = NULL,
-      initial = cbind(step = 1)
+      regression = regression, fits = fits, recipe = recipe, steps = steps,
+      observation_space = NULL, action_space = NULL, initial = cbind(step = 1)
     ),
     class = c("gym_policy_fitted", if (length(fits) > 1L) "gym_policy_memory", "gym_policy")
   )
@@ -145,7 +142,7 @@ new_rule <- function(regression, fits, steps, recipe) {
 # Fitting -------------------------------------------------------------------------------
 
 prepare_steps <- function(steps, regression, stages) {
-  steps$here <- regression$block(steps$state)
+  steps$rows <- regression$rows(steps$state, steps$action)
   steps$after <- regression$block(steps$after)
   steps$stages <- stages
   steps
@@ -153,7 +150,7 @@ prepare_steps <- function(steps, regression, stages) {
 
 # Steps of a table that start and end in the same way become one. `group` tells which.
 equal_steps_together <- function(prepared) {
-  each <- c("here", "action", "after", "ends", "known", if (prepared$stages) "step")
+  each <- c("rows", "after", "ends", "known", if (prepared$stages) "step")
   key <- do.call(paste, prepared[each])
   prepared$group <- match(key, unique(key))
   prepared$each_reward <- prepared$reward
@@ -215,22 +212,20 @@ fit_targets <- function(prepared, regression, ahead, step, discount, used = TRUE
     weight[!prepared$ends & !prepared$known] <- 0
   }
   if (prepared$stages) weight[prepared$step != step] <- 0
-  regression$fit(prepared$here, prepared$action, target, weight)
+  regression$fit(prepared$rows, target, weight)
 }
 
 # The same for all pairs of a table at once: their mean rewards, and where their steps lead.
 table_sweep <- function(prepared, regression, discount) {
   used <- which(prepared$ends | prepared$known)
-  states <- nrow(regression$states)
-  cell <- (prepared$here + states * (prepared$action - 1L))[used]
-  own <- unique(cell)
-  from <- match(cell, own)
+  own <- unique(prepared$rows[used])
+  from <- match(prepared$rows[used], own)
   share <- 1 / tabulate(from)[from]
   reward <- rowsum(share * prepared$reward[used], from, reorder = FALSE)[, 1L]
   goes_on <- !prepared$ends[used]
   moves <- Matrix::sparseMatrix(
     i = from[goes_on], j = prepared$after[used][goes_on], x = discount * share[goes_on],
-    dims = c(length(own), states)
+    dims = c(length(own), nrow(regression$states))
   )
   function(fit, ahead) {
     fit[] <- NA

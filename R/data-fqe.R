@@ -15,7 +15,7 @@ policy_fits <- function(design, prepared, next_at, start = NULL) {
     usable <- prepared$ends | prepared$known
     go_on <- ifelse(prepared$ends | !usable, 0, discount)
     return(list(regression$fixed(
-      prepared$here, prepared$after, prepared$action, prepared$reward, go_on, next_at(NA),
+      prepared$rows, prepared$after, prepared$reward, go_on, next_at(NA),
       prepared$weight * usable, design$call
     )))
   }
@@ -115,7 +115,7 @@ cross_fitted <- function(design) {
     rows <- which(of_step == own)
     fits <- fitting_of(design, own, which(of_step != own))$fit
     block <- design$regression$block(steps$state[rows, , drop = FALSE])
-    q <- values_by_step(design$regression, fits, block, steps$step[rows], length(steps$actions))
+    q <- values_by_step(design$regression, fits, block, steps$step[rows], nrow(steps$actions))
     taken[rows] <- q[cbind(seq_along(rows), steps$action[rows])]
     state[rows] <- policy_mean(q, design$act$here[rows, , drop = FALSE])
   }

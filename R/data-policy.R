@@ -6,7 +6,7 @@
 offline_policy <- function(policy, steps, folds, call) {
   policy <- trained_policy(policy)
   if (inherits(policy, "gym_policy_fitted")) {
-    shared <- mean(episode_keys(steps) %in% policy$keys)
+    shared <- mean(episode_keys(steps) %in% episode_keys(policy$steps))
     # A few short episodes of other data may be the same by chance.
     abort_if(
       is.null(folds) && shared > 0.2, "policy", policy, call,
@@ -48,7 +48,7 @@ action_probabilities <- function(rules, steps, fold, call) {
     if (counts) step <- pmin(step, horizon)
     probabilities_of(rules[[own]], states, step, steps$actions, call)
   }
-  here <- matrix(0, length(steps$step), length(steps$actions))
+  here <- matrix(0, length(steps$step), nrow(steps$actions))
   of_step <- if (many > 1L) fold[steps$episode] else rep(1L, length(steps$step))
   for (own in unique(of_step)) {
     some <- of_step == own
@@ -56,8 +56,10 @@ action_probabilities <- function(rules, steps, fold, call) {
   }
   next_states <- steps$after[steps$known, , drop = FALSE]
   after <- once_per_key(function(key) {
-    found <- matrix(0, length(steps$step), length(steps$actions))
-    found[steps$known, ] <- ask(key[[1L]], next_states, rep(key[[2L]], nrow(next_states)))
+    found <- matrix(0, length(steps$step), nrow(steps$actions))
+    if (any(steps$known)) {
+      found[steps$known, ] <- ask(key[[1L]], next_states, rep(key[[2L]], nrow(next_states)))
+    }
     found
   })
   list(here = here, after = function(own, step) {
@@ -67,12 +69,13 @@ action_probabilities <- function(rules, steps, fold, call) {
 
 # A row for each state, a column for each action of the data.
 probabilities_of <- function(policy, states, step, actions, call) {
-  many <- length(actions)
+  n <- nrow(states)
+  labels <- row_texts(actions)
   said <- if (inherits(policy, "gym_policy_fitted")) {
     predict_policy(policy, data.frame(states, step = step, check.names = FALSE), "probability",
-                   call)[, match(as.character(actions), as.character(policy$actions)), drop = FALSE]
+                   call)
   } else if (inherits(policy, "gym_policy_random")) {
-    matrix(1 / many, nrow(states), many)
+    matrix(1 / length(labels), n, length(labels))
   } else if (inherits(policy, "gym_policy")) {
     known_policy_says(policy, states, call)
   } else if (is.function(policy)) {
@@ -80,11 +83,15 @@ probabilities_of <- function(policy, states, step, actions, call) {
   } else {
     policy
   }
-  if (is.data.frame(said)) said <- as.matrix(said)
+  if (is.data.frame(said)) {
+    # An action of several parts, or probabilities.
+    parts <- names(actions)
+    said <- if (all(parts %in% names(said))) row_texts(said[parts]) else as.matrix(said)
+  }
   if (is.matrix(said)) {
-    checked_probabilities(said, nrow(states), actions, call)
+    checked_probabilities(said, n, labels, call)
   } else {
-    one_of_actions(said, nrow(states), actions, call)
+    one_of_actions(said, n, labels, call)
   }
 }
 
@@ -104,8 +111,7 @@ known_policy_says <- function(policy, states, call) {
   said
 }
 
-checked_probabilities <- function(said, n, actions, call) {
-  labels <- as.character(actions)
+checked_probabilities <- function(said, n, labels, call) {
   # `cbind(1 - p, p)` names one column of two.
   named <- function() length(colnames(said)) && all(nzchar(colnames(said)))
   if (!named() && ncol(said) == length(labels)) colnames(said) <- labels
@@ -124,16 +130,16 @@ checked_probabilities <- function(said, n, actions, call) {
   found
 }
 
-one_of_actions <- function(said, n, actions, call) {
+one_of_actions <- function(said, n, labels, call) {
   said <- if (is.list(said)) NA else as.character(said)
   if (!length(said) %in% c(1L, n) || anyNA(said)) {
     abort_argument(said, paste("an action, or one for each of", count_of(n, "state")), "policy",
                    call)
   }
   said <- rep_len(said, n)
-  check_seen_actions(table(said) / n, as.character(actions), call)
-  found <- matrix(0, n, length(actions))
-  found[cbind(seq_len(n), match(said, as.character(actions)))] <- 1
+  check_seen_actions(table(said) / n, labels, call)
+  found <- matrix(0, n, length(labels))
+  found[cbind(seq_len(n), match(said, labels))] <- 1
   found
 }
 
@@ -197,7 +203,7 @@ known_behavior <- function(p, label) {
 }
 
 logistic_probabilities <- function(formula, steps, weight, call) {
-  many <- length(steps$actions)
+  many <- nrow(steps$actions)
   data <- data.frame(steps$state, taken = steps$action - 1L, weight = weight, check.names = FALSE)
   formula <- stats::reformulate(deparse1(formula[[length(formula)]]), "taken",
                                 env = environment(formula))

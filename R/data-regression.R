@@ -2,9 +2,9 @@
 # model that R can fit and predict with.
 #
 # Each is a list of functions. `block(states)` prepares states once, so that values of all actions
-# can be computed many times; `fit(block, action, target, weight)` returns a fit; `values(fit,
-# block)` returns a matrix with a row for each state and a column for each action. `fixed(...)`, if
-# there is one, solves the equations of a policy's values at once.
+# can be computed many times, and `rows(states, action)` prepares steps: `fit(rows, target, weight)`
+# returns a fit; `values(fit, block)` returns a matrix with a row for each state and a column for
+# each action. `fixed(...)`, if there is one, solves the equations of a policy's values at once.
 
 #' Choose the regression
 #'
@@ -33,9 +33,9 @@ is_table_like <- function(steps) {
     return(FALSE)
   }
   pairs <- !duplicated(data.frame(steps$state, steps$action))
-  length(pairs) >= least_steps_of_pair * sum(pairs)
+  # At least five steps for each pair.
+  length(pairs) >= 5L * sum(pairs)
 }
-least_steps_of_pair <- 5L
 
 # The response is called `value`. Without a formula a linear model has coefficients of its own for
 # each action, and another model gets all columns.
@@ -43,10 +43,9 @@ value_formula <- function(formula, steps, linear, call) {
   if (is.null(formula)) {
     columns <- sprintf("`%s`", names(steps$state))
     of_state <- paste(columns, collapse = " + ")
-    several <- length(steps$actions) > 1L
     right <- if (!linear) {
-      paste(c("action", columns), collapse = " + ")
-    } else if (several) {
+      paste("action +", of_state)
+    } else if (nrow(steps$actions) > 1L) {
       paste0("action * (", of_state, ")")
     } else {
       of_state
@@ -54,7 +53,7 @@ value_formula <- function(formula, steps, linear, call) {
     return(stats::as.formula(paste("value ~", right), globalenv()))
   }
   right <- formula[[length(formula)]]
-  known <- c("action", names(steps$state))
+  known <- unique(c("action", names(steps$actions), names(steps$state)))
   unknown <- setdiff(all.vars(right), c(known, "."))
   unknown <- unknown[!vapply(unknown, exists, NA, envir = environment(formula))]
   abort_if(
@@ -65,38 +64,56 @@ value_formula <- function(formula, steps, linear, call) {
   stats::reformulate(deparse1(right), "value", env = environment(formula))
 }
 
+# The states with an action each, as a formula sees them: `action` is a factor, and an action of
+# several parts has a column for each. (Rows of a data frame that are selected twice would get
+# names, which takes long.)
+with_action <- function(states, action, actions, rows = seq_along(action)) {
+  states <- list2DF(lapply(states, function(x) x[rows]))
+  if (length(actions) > 1L) {
+    states[names(actions)] <- lapply(actions, function(part) {
+      if (is.character(part)) part <- factor(part)
+      part[action]
+    })
+  }
+  states$action <- structure(action, levels = row_texts(actions), class = "factor")
+  states
+}
+
 # A table -------------------------------------------------------------------------------
 
-# The fit is a matrix with a row for each state, and `NA` where an action was never taken.
+# The fit is a matrix with a row for each state, and `NA` where an action was never taken. Rows of
+# steps are their places in it.
 table_regression <- function(steps) {
-  states <- sorted_rows(unique(rbind(steps$state, steps$after[steps$known, , drop = FALSE])))
+  states <- sorted_rows(unique(
+    rbind(unique(steps$state), unique(steps$after[steps$known, , drop = FALSE]))
+  ))
   keys <- row_keys(states)
-  many <- length(steps$actions)
+  count <- nrow(states)
+  many <- nrow(steps$actions)
+  block <- function(states) match(row_keys(states), keys)
   list(
-    label = paste0("a table of ", count_of(nrow(states), "state"), " and ",
-                   count_of(many, "action")),
-    states = states, block = function(states) match(row_keys(states), keys),
-    fit = function(block, action, target, weight) {
-      cell <- block + nrow(states) * (action - 1L)
-      sums <- rowsum(cbind(weight, weight * target), cell, reorder = FALSE)
-      fit <- matrix(NA_real_, nrow(states), many)
+    label = paste0("a table of ", count_of(count, "state"), " and ", count_of(many, "action")),
+    states = states, block = block,
+    rows = function(states, action) block(states) + count * (action - 1L),
+    fit = function(rows, target, weight) {
+      sums <- rowsum(cbind(weight, weight * target), rows, reorder = FALSE)
+      fit <- matrix(NA_real_, count, many)
       used <- sums[, 1L] > 0
       fit[as.integer(rownames(sums))[used]] <- sums[used, 2L] / sums[used, 1L]
       fit
     },
     values = function(fit, block) fit[block, , drop = FALSE],
-    fixed = function(here, after, action, reward, go_on, p_next, weight, call) {
+    fixed = function(rows, after, reward, go_on, p_next, weight, call) {
       used <- weight > 0
-      cell <- (here + nrow(states) * (action - 1L))[used]
-      own <- unique(cell)
-      from <- match(cell, own)
+      own <- unique(rows[used])
+      from <- match(rows[used], own)
       sums <- rowsum(cbind(weight, weight * reward)[used, , drop = FALSE], from, reorder = FALSE)
       share <- (weight * go_on * p_next)[used, , drop = FALSE] / sums[from, 1L]
-      to <- match(outer(after[used], nrow(states) * (seq_len(many) - 1L), `+`), own)
+      to <- match(outer(after[used], count * (seq_len(many) - 1L), `+`), own)
       some <- which(!is.na(to) & share > 0)
       moves <- flow_matrix(rep(from, many)[some], to[some], share[some], length(own))
       ending <- from[go_on[used] < 1 | rowSums(is.na(to) & share > 0) > 0]
-      fit <- matrix(NA_real_, nrow(states), many)
+      fit <- matrix(NA_real_, count, many)
       fit[own] <- chain_values(moves, sums[, 2L] / sums[, 1L], ending, call)
       fit
     }
@@ -120,78 +137,69 @@ chain_values <- function(moves, reward, ending, call) {
 
 # A linear model ------------------------------------------------------------------------
 
-# Least squares by normal equations of scaled columns, which are set up once: only the response
-# changes between iterations.
+# Least squares by normal equations, which are set up once: only the response changes between
+# iterations. The fit is the coefficients.
 linear_regression <- function(formula, steps, call) {
-  labels <- as.character(steps$actions)
-  levels <- lapply(Filter(is.factor, steps$state), levels)
-  terms <- stats::terms(formula, data = data.frame(steps$state, action = steps$action, value = 0,
-                                                   check.names = FALSE))
-  design <- function(states, action) {
-    states$action <- factor(labels[action], labels)
-    if (length(labels) == 1L) states$action <- rep(1, nrow(states))
-    frame <- stats::model.frame(stats::delete.response(basis), states, na.action = stats::na.pass,
-                                xlev = levels)
-    stats::model.matrix(stats::delete.response(basis), frame)
-  }
+  actions <- steps$actions
+  many <- nrow(actions)
   # Terms such as poly() keep what they learned from the data.
-  first <- steps$state
-  first$action <- if (length(labels) > 1L) factor(labels[steps$action], labels) else 1
+  first <- with_action(steps$state, steps$action, actions)
   first$value <- 0
   basis <- tryCatch(
-    stats::terms(stats::model.frame(terms, first)),
+    stats::delete.response(stats::terms(stats::model.frame(formula, first))),
     error = function(cnd) abort_regression(cnd, call)
   )
+  design <- function(states, action) {
+    frame <- with_action(states, action, actions)
+    if (many == 1L) frame$action <- 1
+    stats::model.matrix(basis, stats::model.frame(basis, frame, na.action = stats::na.pass))
+  }
   x <- design(steps$state, steps$action)
   decomposed <- qr(x)
   kept <- sort(decomposed$pivot[seq_len(decomposed$rank)])
+  names <- colnames(x)[kept]
+  rows <- function(states, action) design(states, action)[, kept, drop = FALSE]
+  # Columns of the same size lose the fewest digits.
   size <- sqrt(colSums(x[, kept, drop = FALSE]^2))
-  block <- function(states) {
-    known <- stats::complete.cases(states)
-    lapply(seq_along(labels), function(action) {
-      rows <- matrix(0, nrow(states), length(kept))
-      some <- states[known, , drop = FALSE]
-      own <- design(some, rep(action, nrow(some)))[, kept, drop = FALSE]
-      rows[known, ] <- own / rep(size, each = nrow(own))
-      rows
-    })
-  }
-  taken <- function(block, action) {
-    rows <- block[[1L]]
-    for (i in seq_along(block)[-1L]) rows[action == i, ] <- block[[i]][action == i, ]
-    rows
-  }
-  solved <- function(gram, right) {
-    tryCatch(solve(gram, right, tol = 1e-18), error = function(cnd) {
-      abort_wrong(
-        "formula", NULL, call, "The linear model has no solution.",
-        i = "Give a `discount` below 1 or a `horizon`, or a `formula` with fewer terms."
-      )
-    })
-  }
+  square <- function(rows, others) crossprod(rows, others) / outer(size, size)
   memory <- rlang::env()
   list(
-    label = paste("linear,", deparse1(formula[-2L])), block = block,
-    coefficients = function(fit) stats::setNames(fit / size, colnames(x)[kept]),
-    fit = function(block, action, target, weight) {
-      # The rows of the actions taken are the same in every iteration.
-      of <- list(block, action, weight)
+    label = paste("linear,", deparse1(formula[-2L])), rows = rows,
+    coefficients = function(fit) stats::setNames(fit, names),
+    block = function(states) {
+      known <- which(stats::complete.cases(states))
+      some <- states[known, , drop = FALSE]
+      lapply(seq_len(many), function(action) {
+        own <- matrix(0, nrow(states), length(kept))
+        own[known, ] <- rows(some, rep(action, length(known)))
+        own
+      })
+    },
+    fit = function(rows, target, weight) {
+      # They are the same in every iteration.
+      of <- list(rows, weight)
       if (!identical(memory$of, of)) {
         memory$of <- of
-        memory$rows <- taken(block, action)
-        memory$gram <- crossprod(memory$rows, weight * memory$rows)
+        memory$qr <- qr(square(rows, weight * rows), tol = 1e-12)
       }
-      drop(solved(memory$gram, crossprod(memory$rows, weight * target)))
+      found <- qr.coef(memory$qr, crossprod(rows, weight * target) / size)[, 1L] / size
+      # As in lm(), terms that depend on others, in these steps, are left out.
+      found[is.na(found)] <- 0
+      found
     },
-    values = function(fit, block) {
-      matrix(vapply(block, function(rows) drop(rows %*% fit), numeric(nrow(block[[1L]]))),
-             nrow(block[[1L]]))
-    },
-    fixed = function(here, after, action, reward, go_on, p_next, weight, call) {
-      rows <- taken(here, action)
+    values = function(fit, block) do.call(cbind, lapply(block, function(rows) rows %*% fit)),
+    fixed = function(rows, after, reward, go_on, p_next, weight, call) {
       ahead <- Reduce(`+`, lapply(seq_along(after), function(i) after[[i]] * p_next[, i]))
-      drop(solved(crossprod(rows, weight * (rows - go_on * ahead)),
-                  crossprod(rows, weight * reward)))
+      right <- crossprod(rows, weight * reward) / size
+      tryCatch(
+        solve(square(rows, weight * (rows - go_on * ahead)), right, tol = 1e-18)[, 1L] / size,
+        error = function(cnd) {
+          abort_wrong(
+            "formula", NULL, call, "The linear model has no solution.",
+            i = "Give a `discount` below 1 or a `horizon`, or a `formula` with fewer terms."
+          )
+        }
+      )
     }
   )
 }
@@ -199,29 +207,26 @@ linear_regression <- function(formula, steps, call) {
 # Any model -----------------------------------------------------------------------------
 
 any_regression <- function(formula, model, steps) {
-  labels <- as.character(steps$actions)
-  # Rows of a data frame that are selected twice would get names, which takes long.
-  with_action <- function(states, rows, action) {
-    states <- list2DF(lapply(states, function(x) x[rows]))
-    states$action <- factor(labels[action], labels)
-    states
-  }
+  actions <- steps$actions
+  many <- nrow(actions)
   list(
     label = paste("a model,", deparse1(formula[-2L])),
     block = function(states) list(states = states, known = stats::complete.cases(states)),
-    fit = function(block, action, target, weight) {
+    rows = function(states, action) with_action(states, action, actions),
+    fit = function(rows, target, weight) {
       # A weight is how often a row was drawn.
-      rows <- rep(seq_along(target), round(weight))
-      data <- with_action(block$states, rows, action[rows])
-      data$value <- target[rows]
+      rows$value <- target
+      drawn <- rep(seq_along(target), round(weight))
+      data <- list2DF(lapply(rows, function(x) x[drawn]))
       tryCatch(model(formula, data = data), error = function(cnd) abort_regression(cnd, NULL))
     },
     values = function(fit, block) {
       some <- which(block$known)
-      values <- matrix(0, length(block$known), length(labels))
+      values <- matrix(0, length(block$known), many)
       if (length(some)) {
-        each <- rep(seq_along(labels), each = length(some))
-        asked <- with_action(block$states, rep(some, length(labels)), each)
+        asked <- with_action(
+          block$states, rep(seq_len(many), each = length(some)), actions, rep(some, many)
+        )
         values[some, ] <- model_values(fit, asked)
       }
       values

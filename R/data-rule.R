@@ -2,10 +2,11 @@
 
 # The values of all actions in some states, a data frame.
 rule_values <- function(policy, states, step = NULL, call = rlang::caller_env()) {
-  check_columns(states, policy$states, "newdata", call)
-  states <- as.data.frame(states)[policy$states]
-  for (name in names(states)) {
-    levels <- levels(policy$seen[[name]])
+  own <- names(policy$steps$state)
+  check_columns(states, own, "newdata", call)
+  states <- as.data.frame(states)[own]
+  for (name in own) {
+    levels <- levels(policy$steps$state[[name]])
     if (!is.null(levels)) {
       new <- setdiff(as.character(states[[name]]), levels)
       abort_if(
@@ -20,7 +21,7 @@ rule_values <- function(policy, states, step = NULL, call = rlang::caller_env())
   if (length(policy$fits) == 1L) {
     return(fit_values(policy$regression, policy$fits[[1L]], block))
   }
-  values <- matrix(NA_real_, nrow(states), length(policy$actions))
+  values <- matrix(NA_real_, nrow(states), nrow(policy$steps$actions))
   step <- rep_len(step, nrow(states))
   if (!all(step %in% seq_along(policy$fits))) {
     must <- paste("a step from 1 to", length(policy$fits))
@@ -35,21 +36,22 @@ rule_values <- function(policy, states, step = NULL, call = rlang::caller_env())
 
 best_known <- function(policy, values) {
   values <- known_values(values)
-  ifelse(rowSums(values > -Inf) > 0, max.col(values, "first"), policy$most_taken)
+  most_taken <- which.max(tabulate(policy$steps$action))
+  ifelse(rowSums(values > -Inf) > 0, max.col(values, "first"), most_taken)
 }
 
 #' @exportS3Method
 predict_policy.gym_policy_fitted <- function(policy, newdata, type, call = rlang::caller_env()) {
   if (!is.data.frame(newdata)) {
-    newdata <- data.frame(matrix(newdata, ncol = length(policy$states)))
-    names(newdata) <- policy$states
+    newdata <- data.frame(matrix(newdata, ncol = length(policy$steps$state)))
+    names(newdata) <- names(policy$steps$state)
   }
   if (length(policy$fits) > 1L) check_columns(newdata, "step", "newdata", call)
   values <- rule_values(policy, newdata, newdata[["step"]], call)
-  colnames(values) <- as.character(policy$actions)
+  colnames(values) <- row_texts(policy$steps$actions)
   best <- best_known(policy, values)
   switch(
-    type, action = policy$actions[best], output = values,
+    type, action = named_numbers(labelled_space(policy$steps$actions), best - 1L), output = values,
     probability = {
       values[] <- 0
       values[cbind(seq_along(best), best)] <- 1
@@ -71,12 +73,11 @@ act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
     columns <- data.frame(
       observation_columns(vector_env$observation_space, observation), check.names = FALSE
     )
-    if (!all(policy$states %in% names(columns)) && length(columns) == length(policy$states)) {
-      names(columns) <- policy$states
-    }
+    own <- names(policy$steps$state)
+    if (!all(own %in% names(columns)) && length(columns) == length(own)) names(columns) <- own
     columns$step <- step
     actions <- predict_policy(policy, columns, "action", vector_env$call)
-    encoded_values(vector_env$action_space, actions, "action", vector_env$call)
+    encoded_actions(vector_env, actions, n)
   }
   if (last == 1L) {
     return(choose(observation))
@@ -85,6 +86,22 @@ act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
     list(action = choose(observation, memory[, "step"]), memory = pmin(memory + 1, last))
   }
   act_batch.gym_policy_memory(policy, observation, n, vector_env)
+}
+
+# A batch of the environment's actions from the actions of the data, or the columns of their parts.
+encoded_actions <- function(vector_env, actions, n) {
+  space <- vector_env$action_space
+  if (inherits(space, "gym_space_discrete")) {
+    return(encoded_values(space, actions, "action", vector_env$call))
+  }
+  if (has_parts(space)) {
+    actions <- as.list(actions)
+    # The keys of a Dict.
+    if (!is.null(names(space$spaces))) names(actions) <- sub("^action_", "", names(actions))
+  } else if (is.data.frame(actions)) {
+    actions <- as.matrix(actions)
+  }
+  batch_actions(actions, n, vector_env)
 }
 
 #' @export
@@ -103,12 +120,14 @@ format.gym_policy_fitted <- function(x, ...) {
 #' @export
 print.gym_policy_fitted <- function(x, ...) {
   cat("<policy: ", format(x), ">\n", sep = "")
-  shown <- length(x$fits) == 1L | x$step <= length(x$fits)
-  taken <- best_known(x, rule_values(x, x$seen[shown, , drop = FALSE], x$step[shown]))
-  share <- function(action) tabulate(action, length(x$actions)) / length(action)
+  steps <- x$steps
+  if (length(x$fits) > 1L) steps <- steps_in(steps, steps$step <= length(x$fits))
+  share <- function(action) {
+    percent_text_each(tabulate(action, nrow(steps$actions)) / length(action))
+  }
+  taken <- best_known(x, rule_values(x, steps$state, steps$step))
   print(data.frame(
-    action = as.character(x$actions), rule = percent_text_each(share(taken)),
-    data = percent_text_each(share(x$taken[shown]))
+    action = row_texts(steps$actions), rule = share(taken), data = share(steps$action)
   ), row.names = FALSE)
   cat(rule_lines(x), sep = "\n")
   invisible(x)
@@ -117,33 +136,35 @@ print.gym_policy_fitted <- function(x, ...) {
 # With two actions a linear rule is one inequality; a small table is shown as it is.
 rule_lines <- function(x) {
   regression <- x$regression
-  if (!is.null(regression$coefficients) && length(x$actions) == 2L && !x$recipe$double) {
+  labels <- row_texts(x$steps$actions)
+  simple <- length(labels) == 2L && length(x$steps$actions) == 1L && !x$recipe$double
+  if (!is.null(regression$coefficients) && simple) {
     return(unlist(lapply(seq_along(x$fits), function(step) {
       own <- regression$coefficients(x$fits[[step]])
-      action <- paste0("action", x$actions[[2L]])
+      action <- paste0("action", labels[[2L]])
       own <- own[grepl(action, names(own), fixed = TRUE)]
       terms <- gsub(paste0(":?", action, ":?"), "", names(own))
       terms <- ifelse(nzchar(terms), paste0(" x ", gsub("`", "", terms)), "")
       sum <- paste0(ifelse(own < 0, " - ", " + "), number_text_each(abs(own)), terms, collapse = "")
       paste0(
-        if (length(x$fits) > 1L) paste0("Step ", step, ": "), "Takes ", x$actions[[2L]], " if ",
+        if (length(x$fits) > 1L) paste0("Step ", step, ": "), "Takes ", labels[[2L]], " if ",
         sub("^ - ", "-", sub("^ [+] ", "", sum)), " > 0"
       )
     })))
   }
   if (!is.null(regression$states) && nrow(regression$states) <= 12L && length(x$fits) == 1L) {
     best <- best_known(x, rule_values(x, regression$states))
-    return(paste0(row_texts(regression$states), ": ", x$actions[best]))
+    return(paste0(row_texts(regression$states), ": ", labels[best]))
   }
   character()
 }
 
 # The values of the states of the data, for state_values().
 rule_state_values <- function(policy, actions) {
-  states <- policy$seen
+  states <- policy$steps$state
   if (length(policy$fits) > 1L) {
-    states <- data.frame(step = policy$step, states, check.names = FALSE)
-    states <- states[policy$step <= length(policy$fits), , drop = FALSE]
+    step <- policy$steps$step
+    states <- data.frame(step, states, check.names = FALSE)[step <= length(policy$fits), ]
   }
   states <- sorted_rows(unique(states))
   q <- rule_values(policy, states, states[["step"]])
@@ -151,8 +172,9 @@ rule_state_values <- function(policy, actions) {
     return(data.frame(states, value = best_values(known_values(q)), check.names = FALSE))
   }
   row <- rep(seq_len(nrow(q)), each = ncol(q))
+  action <- rep(seq_len(ncol(q)), nrow(q))
   data.frame(
-    states[row, , drop = FALSE], action = rep(policy$actions, nrow(q)), value = as.vector(t(q)),
-    row.names = NULL, check.names = FALSE
+    states[row, , drop = FALSE], policy$steps$actions[action, , drop = FALSE],
+    value = as.vector(t(q)), row.names = NULL, check.names = FALSE
   )
 }

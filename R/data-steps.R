@@ -15,14 +15,18 @@
 #' # States and actions
 #'
 #' A state is one column or several of text, factors, logical values or numbers. An action is one
-#' column of text, a factor, logical values or whole numbers.
+#' column or several of text, factors, logical values or whole numbers. Several are the parts of an
+#' action, such as a drug and its dose; each combination in the data is an action.
 #'
 #' @param data A data frame with a row for each step, in any order.
 #' @param episode The name of the column that tells which episode a step belongs to, a string. The
 #'   default is `"episode"`.
 #' @param state The names of the columns of the state, strings. `NULL`, the default, takes all
 #'   columns that have no other meaning here.
-#' @param action,reward The names of the columns of the action and the reward, strings.
+#' @param action The name of the column of the action, or the names of its parts, strings. Without a
+#'   column `"action"` the default takes all columns whose names start with `action_`, as in the
+#'   steps of a rollout.
+#' @param reward The name of the column of the reward, a string.
 #' @param time The name of the column by which the steps of an episode are sorted, a string. `NULL`,
 #'   the default, uses the column `step`, or if there is none the order of the rows.
 #' @param terminated The name of the column that is `TRUE` for the last step of an episode that
@@ -32,10 +36,10 @@
 #' @param next_state The names of the columns of the next state, in the order of `state`. `NULL`,
 #'   the default, uses the columns `next_` and the name of the state's, if all of them are there.
 #' @return A data frame of class `gym_steps` with the columns `episode`, `step` (its number in the
-#'   episode, an integer), those of the state, `action`, `reward`, `terminated`, perhaps
-#'   `probability`, and `next_` and the name of each column of the state. The next state is `NA`
-#'   where it is not known. Its rows can be selected as those of any data frame; the result is
-#'   accepted, too.
+#'   episode, an integer), those of the state, `action` (or `action_` and the name of each part),
+#'   `reward`, `terminated`, perhaps `probability`, and `next_` and the name of each column of the
+#'   state. The next state is `NA` where it is not known. Its rows can be selected as those of any
+#'   data frame; the result is accepted, too.
 #' @section Errors: `gym_error_argument` for a missing column, missing values (the message names the
 #'   rows), a reward that is not a finite number, a probability of 0 or above 1, two steps of an
 #'   episode at the same time, or an episode that goes on after its end.
@@ -65,14 +69,15 @@ steps_data <- function(data, episode = "episode", state = NULL, action = "action
     data, episode, state, action, reward, time, terminated, probability, next_state, call
   )
   state <- own$state
+  actions <- named_as_actions(data[own$action])
   steps <- data.frame(
-    episode = data[[episode]], .row = seq_len(nrow(data)), data[state], action = data[[action]],
+    episode = data[[episode]], .row = seq_len(nrow(data)), data[state], actions,
     reward = data[[reward]],
     terminated = if (is.null(own$terminated)) FALSE else data[[own$terminated]],
     stringsAsFactors = FALSE, check.names = FALSE
   )
   steps$probability <- if (!is.null(own$probability)) data[[own$probability]]
-  check_step_columns(steps, state, call)
+  check_step_columns(steps, state, names(actions), call)
   time <- data[[own$time %||% ""]]
   order <- order(match(steps$episode, unique(steps$episode)), time %||% steps$.row)
   steps <- steps[order, ]
@@ -89,7 +94,7 @@ steps_data <- function(data, episode = "episode", state = NULL, action = "action
     data[order, own$next_state]
   }
   steps$step <- sequence(rle(match(steps$episode, unique(steps$episode)))$lengths)
-  columns <- c("episode", "step", state, "action", "reward", "terminated",
+  columns <- c("episode", "step", state, names(actions), "reward", "terminated",
                if (!is.null(steps$probability)) "probability", after)
   row.names(steps) <- NULL
   structure(steps[columns], class = c("gym_steps", "data.frame"))
@@ -102,6 +107,7 @@ step_columns <- function(data, episode, state, action, reward, time, terminated,
   time <- own("step", time)
   terminated <- own("terminated", terminated)
   probability <- own("probability", probability)
+  if (identical(action, "action")) action <- columns_of_action(names(data))
   taken <- c(episode, action, reward, time, terminated, probability, "truncated", next_state)
   state <- state %||% grep("^next_", setdiff(names(data), taken), value = TRUE, invert = TRUE)
   after <- paste0("next_", state)
@@ -112,17 +118,17 @@ step_columns <- function(data, episode, state, action, reward, time, terminated,
     abort_argument(next_state %||% state, "the names of columns, as many as of the next state",
                    "state", call)
   }
-  reserved <- intersect(
-    state, c("episode", "step", "action", "reward", "terminated", "probability")
-  )
+  reserved <- intersect(state, c(
+    "episode", "step", names(named_as_actions(data[action])), "reward", "terminated", "probability"
+  ))
   abort_if(
     length(reserved), "state", state, call,
     "The column `{reserved[[1L]]}` has another meaning in steps: give it another name in the
      state."
   )
   check_no_missing(data, needed, call)
-  list(state = state, time = time, terminated = terminated, probability = probability,
-       next_state = next_state)
+  list(state = state, action = action, time = time, terminated = terminated,
+       probability = probability, next_state = next_state)
 }
 
 # Checks --------------------------------------------------------------------------------
@@ -143,7 +149,7 @@ rows_text <- function(rows) {
   paste0(toString(utils::head(rows, 5L)), if (length(rows) > 5L) ", ...")
 }
 
-check_step_columns <- function(steps, state, call) {
+check_step_columns <- function(steps, state, actions, call) {
   check_column(steps, "reward", "finite numbers", are_finite, "data", call)
   check_column(steps, "terminated", "TRUE or FALSE", are_flags, "data", call)
   if (!is.null(steps$probability)) {
@@ -155,13 +161,14 @@ check_step_columns <- function(steps, state, call) {
       abort_argument(steps[[name]], "text, a factor, logical values or numbers", name, call)
     }
   }
-  action <- steps$action
-  abort_if(
-    is.numeric(action) && !all(are_whole_numbers(action)) || !is.atomic(action),
-    "action", action, call,
-    "The actions must be text, a factor, logical values or whole numbers.",
-    i = "`cut()` makes a factor of numbers."
-  )
+  for (action in steps[actions]) {
+    abort_if(
+      is.numeric(action) && !all(are_whole_numbers(action)) || !is.atomic(action),
+      "action", action, call,
+      "The actions must be text, a factor, logical values or whole numbers.",
+      i = "`cut()` makes a factor of numbers."
+    )
+  }
 }
 
 check_once <- function(steps, time, name, call) {
@@ -197,8 +204,8 @@ check_ends_once <- function(steps, last, call) {
 #' @return A list with an element, or a row, for each step, in order: `episode` (from 1), `step`,
 #'   `state` and `after` (data frames; text is a factor), `known` (is the next state known?),
 #'   `action` (its number, from 1), `reward`, `ends`, `probability` (or `NULL`), `last`. And
-#'   `actions`, their values; `episodes`, `labels` (of the episodes) and `longest`, numbers;
-#'   `cut`, the lengths of the episodes that were cut off.
+#'   `actions`, a data frame with a row for each action of the data; `episodes`, `labels` (of the
+#'   episodes) and `longest`, numbers; `cut`, the lengths of the episodes that were cut off.
 #' @noRd
 steps_of <- function(data, call = rlang::caller_env()) {
   if (!inherits(data, "gym_steps")) {
@@ -217,18 +224,14 @@ steps_of <- function(data, call = rlang::caller_env()) {
       data[[after[[i]]]] <- factor(next_one, levels)
     }
   }
-  actions <- if (is.factor(data$action)) {
-    factor(levels(data$action), levels(data$action))
-  } else {
-    sort(unique(data$action))
-  }
-  actions <- actions[actions %in% data$action]
+  taken <- data[columns_of_action(names(data))]
+  actions <- sorted_rows(unique(taken))
   episode <- match(data$episode, unique(data$episode))
   last <- !duplicated(episode, fromLast = TRUE)
   next_state <- stats::setNames(data[after], state)
   list(
     episode = episode, step = data$step, state = data[state], after = next_state,
-    known = stats::complete.cases(next_state), action = match(data$action, actions),
+    known = stats::complete.cases(next_state), action = match(row_texts(taken), row_texts(actions)),
     actions = actions, reward = as.double(data$reward), ends = data$terminated,
     probability = data$probability, last = last, episodes = max(episode),
     labels = unique(data$episode), longest = max(data$step),
@@ -268,7 +271,7 @@ print.gym_steps <- function(x, ...) {
   steps <- steps_of(x)
   lengths <- range(tabulate(steps$episode))
   cut <- length(steps$cut)
-  share <- tabulate(steps$action, length(steps$actions)) / length(steps$action)
+  share <- tabulate(steps$action, nrow(steps$actions)) / length(steps$action)
   kinds <- vapply(steps$state, function(column) {
     if (is.numeric(column)) "number" else count_of(length(unique(column)), "value")
   }, "")
@@ -277,8 +280,11 @@ print.gym_steps <- function(x, ...) {
            paste(unique(lengths), collapse = " to "), " steps each, ",
            if (cut) paste(whole_number_text(cut), "cut off") else "all ended", ">"),
     paste0("State: ", toString(paste0(names(kinds), " (", kinds, ")"))),
-    paste0("Actions: ", toString(utils::head(paste(steps$actions, percent_text_each(share)), 8L)),
-           if (length(share) > 8L) ", ..."),
+    paste0("Actions: ", paste(
+      c(utils::head(paste(row_texts(steps$actions), percent_text_each(share)), 8L),
+        if (length(share) > 8L) "..."),
+      collapse = if (length(steps$actions) > 1L) "; " else ", "
+    )),
     paste0("Mean return: ", number_text(sum(steps$reward) / steps$episodes),
            if (!is.null(steps$probability)) "; with the probabilities of the actions")
   ))
@@ -305,10 +311,10 @@ estimate_model.gym_steps <- function(x, ...) {
   own <- if (length(states) == 1L) "state" else states
   table <- data.frame(
     episode = steps$episode, step = steps$step, stats::setNames(steps$state, own),
-    action = steps$actions[steps$action], stats::setNames(steps$after, paste0("next_", own)),
-    reward = steps$reward, terminated = steps$ends, check.names = FALSE
+    steps$actions[steps$action, , drop = FALSE], stats::setNames(steps$after, paste0("next_", own)),
+    reward = steps$reward, terminated = steps$ends, row.names = NULL, check.names = FALSE
   )[rows, ]
-  coded <- coded_transitions(table, own, rlang::current_env())
+  coded <- coded_transitions(table, own, names(steps$actions), rlang::current_env())
   if (!is.null(coded$states)) names(coded$states$values) <- states
   attr(coded$table, "spaces") <- list(
     observation_space = coded$states, action_space = coded$actions

@@ -7,8 +7,8 @@
 #'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`. The columns
 #'   `episode` and `step` tell which rows are the first of an episode, where episodes start. Without
 #'   `step` the rows of each episode must be in order. Without both, an episode goes on in the next
-#'   row until it is terminated. Observations of several parts that can be counted, such as those of
-#'   a MultiDiscrete space, become states with the names of their columns.
+#'   row until it is terminated. Observations and actions of several parts that can be counted, such
+#'   as those of a MultiDiscrete space, become states and actions with the names of their columns.
 #'   Or the result of [steps_data()], whose states and actions keep their names. A step that ends an
 #'   episode without a known next state then leads back to its own state.
 #' @param ... For methods.
@@ -41,7 +41,7 @@ estimate_model.gym_rollout <- function(x, ...) {
   # The spaces of the environment, if the policy has them; a function does not.
   spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
   if (is.data.frame(steps)) {
-    spaces <- counted_states(spaces, steps)
+    spaces <- counted_spaces(spaces, steps)
     steps <- steps_by_number(steps, spaces, call)
   }
   after <- grep("^next_", names(steps), value = TRUE)
@@ -91,15 +91,16 @@ estimate_model.data.frame <- function(x, ...) {
   )
 }
 
-# Observations of several parts that can be counted, such as those of a MultiDiscrete space, become
-# states with the names of their columns.
-counted_states <- function(spaces, steps) {
+# Observations and actions of several parts that can be counted, such as those of a MultiDiscrete
+# space, become states and actions with the names of their columns.
+counted_spaces <- function(spaces, steps) {
   space <- spaces$observation_space
   after <- grep("^next_", names(steps), value = TRUE)
   if (length(after) > 1L && is.null(space$values) && !is.null(space_index(space))) {
     values <- all_values(space)
     spaces$observation_space <- labelled_space(stats::setNames(values, sub("^next_", "", after)))
   }
+  spaces$action_space <- countable_actions(spaces$action_space) %||% spaces$action_space
   spaces
 }
 
@@ -114,8 +115,11 @@ steps_by_number <- function(steps, spaces, call) {
     steps <- steps[setdiff(names(steps), c(columns, after))]
     steps[c("state", "next_state")] <- list(state, next_state)
   }
-  if (!is.null(spaces$action_space$values)) {
-    steps$action <- encoded_values(spaces$action_space, steps$action, "action", call)
+  parts <- spaces$action_space$values
+  if (!is.null(parts)) {
+    action <- encoded_values(spaces$action_space, steps[names(parts)], "action", call)
+    steps <- steps[setdiff(names(steps), names(parts))]
+    steps$action <- action
   }
   steps
 }

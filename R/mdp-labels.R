@@ -3,16 +3,16 @@
 #' Number the states and actions of a table
 #'
 #' @param x A table of transitions or steps.
-#' @param state The names of the columns of the state.
+#' @param state,action The names of the columns of the state and of the action.
 #' @return A list: `table`, with whole numbers in `state`, `action` and `next_state`; `states` and
 #'   `actions`, spaces with names, `NULL` for those that were numbers.
 #' @noRd
-coded_transitions <- function(x, state, call, arg = "transitions") {
+coded_transitions <- function(x, state, action, call, arg = "transitions") {
   if (!is.data.frame(x)) {
     return(list(table = x))
   }
   after <- paste0("next_", state)
-  check_columns(x, c(state, after, "action"), arg, call)
+  check_columns(x, c(state, after, action), arg, call)
   x <- as.data.frame(x)
   from <- x[state]
   to <- stats::setNames(x[after], state)
@@ -25,9 +25,12 @@ coded_transitions <- function(x, state, call, arg = "transitions") {
     x$state <- from[[1L]]
     x$next_state <- to[[1L]]
   }
-  if (has_names(x$action)) {
-    coded$actions <- labelled_space(sorted_rows(unique(x["action"])))
-    x$action <- encoded_values(coded$actions, x$action, "action", call)
+  taken <- named_as_actions(x[action])
+  if (length(action) > 1L || has_names(taken[[1L]])) {
+    coded$actions <- labelled_space(sorted_rows(unique(taken)))
+    x$action <- encoded_values(coded$actions, taken, "action", call)
+  } else {
+    x$action <- taken[[1L]]
   }
   coded$table <- x
   coded
@@ -57,13 +60,13 @@ sorted_rows <- function(x) {
 named_transitions <- function(model) {
   table <- model$transitions
   states <- model$observation_space
+  from <- table["state"]
+  to <- table["next_state"]
   if (!is.null(states$values)) {
-    after <- decoded_values(states, table$next_state)
-    names(after) <- paste0("next_", names(after))
-    own <- data.frame(decoded_values(states, table$state), action = table$action, after,
-                      check.names = FALSE)
-    table <- cbind(own, table[c("probability", "reward", "terminated")])
+    from <- decoded_values(states, table$state)
+    to <- decoded_values(states, table$next_state)
+    names(to) <- paste0("next_", names(to))
   }
-  table$action <- named_numbers(model$action_space, table$action)
-  table
+  data.frame(from, decoded_actions(model$action_space, table$action), to,
+             table[c("probability", "reward", "terminated")], check.names = FALSE)
 }

@@ -13,8 +13,8 @@
 #' columns of matrices and vectors start at 1, as always in R: the first row belongs to the lowest
 #' number.
 #'
-#' States and actions may also have names: text or factors, or several columns for the states, such
-#' as `row` and `column`. In play each is then a number from 0, in the order of the levels, or of
+#' States and actions may also have names: text or factors, or several columns, such as `row` and
+#' `column` for the states. In play each is then a number from 0, in the order of the levels, or of
 #' the columns; results, tables and pictures show the names. [policy_table()] and others are asked
 #' by name, too: `predict(solution, "low")`.
 #'
@@ -24,6 +24,8 @@
 #'   if no row leaves `next_state`). An action without a row in a state is invalid there.
 #' @param state The names of the columns of the state, strings. The default is `"state"`. Those of
 #'   the next state have `next_` before them.
+#' @param action The names of the columns of the action, strings. The default is `"action"`. Results
+#'   show those of several parts as `action_` and the name.
 #' @param start Where episodes start: a state's number or name, or several of them, which are
 #'   equally likely; or probabilities, with the states' numbers or names as names, or one for each
 #'   state. (A vector with as many elements as there are states has probabilities.) `NULL`, the
@@ -61,7 +63,7 @@
 #' machine
 #' solve_mdp(machine, discount = 0.95)
 gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_steps = NULL,
-                      reward_threshold = NULL, state = "state") {
+                      reward_threshold = NULL, state = "state", action = "action") {
   check_string(id)
   check_count(max_episode_steps, allow_null = TRUE)
   check_number(reward_threshold, allow_null = TRUE)
@@ -69,7 +71,7 @@ gym_model <- function(transitions, start = NULL, id = "R-model", max_episode_ste
     id = id, reward_threshold = reward_threshold,
     max_episode_steps = if (!is.null(max_episode_steps)) as.integer(max_episode_steps)
   )
-  coded <- coded_transitions(transitions, state, rlang::current_env())
+  coded <- coded_transitions(transitions, state, action, rlang::current_env())
   table <- check_transitions(coded$table)
   states <- coded$states %||% spanned_space(c(table$state, table$next_state), "states")
   actions <- coded$actions %||% spanned_space(table$action, "actions")
@@ -160,8 +162,8 @@ check_probabilities <- function(table, states, actions, call) {
     at <- strsplit(names(sums)[[wrong[[1L]]]], " ", fixed = TRUE)[[1L]]
     abort_wrong(
       "transitions", NULL, call,
-      "The probabilities of action {named_numbers(actions, as.integer(at[[2L]]))} in state
-       {named_numbers(states, as.integer(at[[1L]]))} add up to
+      "The probabilities of action {value_labels(actions, as.integer(at[[2L]]))} in state
+       {value_labels(states, as.integer(at[[1L]]))} add up to
        {format(sums[[wrong[[1L]]]], digits = 10)}, not to 1.",
       i = if (length(wrong) > 1L) {
         'The same holds for {count_of(length(wrong) - 1, "further pair")} of a state and an action.'
@@ -174,7 +176,7 @@ check_ends <- function(table, states, call) {
   stuck <- !table$terminated & table$probability > 0 & !table$next_state %in% table$state
   abort_if(
     any(stuck), "transitions", NULL, call,
-    "No row leaves state {named_numbers(states, table$next_state[stuck][[1L]])}, and arriving there
+    "No row leaves state {value_labels(states, table$next_state[stuck][[1L]])}, and arriving there
      does not end the episode.",
     i = "Set `terminated` to TRUE in the rows that lead there, or add rows that leave it."
   )

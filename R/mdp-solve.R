@@ -236,10 +236,10 @@ solution_meaning <- function(x) {
 
 #' @export
 as.data.frame.gym_solution <- function(x, row.names = NULL, optional = FALSE, ...) {
-  numbers <- if (is.null(x$actions)) NA_integer_ else as.matrix(x$actions)[, 1L]
+  numbers <- if (is.null(x$actions)) rep(NA, length(x$values)) else as.matrix(x$actions)[, 1L]
   data.frame(
     all_values(x$model$observation_space), value = unname(x$values),
-    action = named_numbers(x$model$action_space, numbers), row.names = row.names,
+    decoded_actions(x$model$action_space, as.integer(numbers)), row.names = row.names,
     check.names = FALSE
   )
 }

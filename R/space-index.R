@@ -129,6 +129,20 @@ digit_values <- function(space) {
   }
 }
 
+# The Discrete space of the numbers of actions of several parts, which have the columns of the table
+# of steps as names; NULL if they cannot be counted.
+countable_actions <- function(space) {
+  if (is.null(space) || is.null(space_index(space))) {
+    return(NULL)
+  }
+  if (inherits(space, "gym_space_discrete")) {
+    return(space)
+  }
+  values <- all_values(space)
+  names(values) <- names(value_columns(space, values_batch(space, values), "action"))
+  labelled_space(values)
+}
+
 #' Make a batch of values of a space from the table of their numbers
 #' @param columns A data frame as returned by [all_values()].
 #' @noRd

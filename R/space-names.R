@@ -109,7 +109,8 @@ value_columns.gym_space_array <- function(space, values, name) {
 
 #' @exportS3Method
 value_columns.gym_space_discrete <- function(space, values, name) {
-  stats::setNames(list(named_numbers(space, values)), name)
+  named <- named_numbers(space, values)
+  if (is.data.frame(named)) as.list(named) else stats::setNames(list(named), name)
 }
 
 #' @exportS3Method
@@ -124,6 +125,19 @@ value_columns.gym_space_tuple <- function(space, values, name) {
 
 #' @exportS3Method
 value_columns.gym_space_dict <- value_columns.gym_space_tuple
+
+# The column of the action is `action`, those of its parts start with `action_`.
+named_as_actions <- function(columns) {
+  parts <- part_columns("action", sub("^action_", "", names(columns)))
+  stats::setNames(columns, if (length(columns) == 1L) "action" else parts)
+}
+
+# The names of these columns; those of a state have columns of the next state, too.
+columns_of_action <- function(columns) {
+  parts <- grep("^action_", columns, value = TRUE)
+  parts <- parts[!paste0("next_", parts) %in% columns]
+  if ("action" %in% columns || !length(parts)) "action" else parts
+}
 
 # Labels ----------------------------------------------------------------------------------
 
@@ -140,9 +154,9 @@ labelled_space <- function(values) {
   space
 }
 
-# A text for each number of a Discrete space.
-value_labels <- function(space) {
-  if (is.null(space$values)) as.character(state_numbers(space)) else row_texts(space$values)
+# A text for each number of a Discrete space, or for some of them.
+value_labels <- function(space, numbers = state_numbers(space)) {
+  if (is.null(space$values)) as.character(numbers) else row_texts(decoded_values(space, numbers))
 }
 
 # A text for each row of a data frame.
@@ -150,7 +164,7 @@ row_texts <- function(rows, sep = ", ") {
   do.call(paste, c(unname(lapply(rows, as.character)), sep = sep))
 }
 
-# The values of these numbers: a data frame of the columns of states.
+# The values of these numbers: a data frame of the columns of states, or of actions.
 decoded_values <- function(space, numbers) {
   values <- space$values[numbers - space$start + 1L, , drop = FALSE]
   row.names(values) <- NULL
@@ -163,7 +177,13 @@ named_numbers <- function(space, numbers) {
     return(numbers)
   }
   values <- decoded_values(space, numbers)
-  if (length(values) == 1L) values[[1L]] else value_labels(space)[numbers - space$start + 1L]
+  if (length(values) == 1L) values[[1L]] else values
+}
+
+# The same as columns of a table.
+decoded_actions <- function(space, numbers) {
+  actions <- named_numbers(space, numbers)
+  if (is.data.frame(actions)) actions else data.frame(action = actions)
 }
 
 #' Return the numbers of some values

@@ -89,6 +89,36 @@ test_that("a rule plays in the environment of its data", {
   expect_equal(rollout(walk, linear, episodes = 3, seed = 1)$episodes$return, c(1, 1, 1))
 })
 
+test_that("a rule plays actions of several parts", {
+  # What pays is the state, and twice the state.
+  make <- function(action_space) {
+    gym_env(
+      reset = function(self) self$state <- sample(0:1, 1),
+      step = function(self, action) {
+        reward <- (action[[1]] == self$state) + (action[[2]] == 2 * self$state)
+        self$state <- sample(0:1, 1)
+        list(observation = self$state, reward = reward, terminated = FALSE)
+      },
+      observation_space = space_discrete(2), action_space = action_space, max_episode_steps = 4
+    )
+  }
+  parts <- list(space_discrete(2), space_discrete(3))
+  spaces <- list(
+    space_multi_discrete(2:3), space_tuple(parts[[1]], parts[[2]]),
+    space_dict(left = parts[[1]], right = parts[[2]])
+  )
+  for (space in spaces) {
+    env <- make(space)
+    played <- rollout(env, policy_random(), episodes = 60, seed = 1, steps = TRUE,
+                      next_observation = TRUE)
+    rule <- learn_q(played, discount = 0.5)
+    expect_equal(unlist(predict(rule, data.frame(obs_1 = 1))), c(1, 2), ignore_attr = TRUE)
+    expect_equal(rollout(env, rule, episodes = 2, seed = 1)$episodes$return, c(8, 8))
+    solved <- as.data.frame(solve_mdp(estimate_model(played), discount = 0.5))
+    expect_equal(unlist(solved[2, 3:4]), c(1, 2), ignore_attr = TRUE)
+  }
+})
+
 test_that("a rule with a horizon counts the steps of each episode that it plays", {
   # On the right staying pays 2 and leaving 3, so the last step is the one to leave.
   walk <- gym_model(data.frame(

@@ -62,3 +62,40 @@ test_that("invalid steps are errors that name the rows", {
     "another name"
   )
 })
+
+# The best treatment is the new drug if the state is high, the old one if it is low, in a dose of 5.
+drugs_and_doses <- function() {
+  data <- expand.grid(
+    severity = c("low", "high"), drug = c("new", "old"), dose = c(1, 5), again = 1:6,
+    stringsAsFactors = FALSE
+  )
+  data$patient <- seq_len(nrow(data))
+  data$y <- (data$severity == "high") * (data$drug == "new") * 2 +
+    (data$severity == "low") * (data$drug == "old") + data$dose / 10
+  steps_data(data, "patient", "severity", c("drug", "dose"), "y")
+}
+
+test_that("an action may have several parts, which rules and policies give and take", {
+  steps <- drugs_and_doses()
+  expect_equal(names(as.data.frame(steps))[4:5], c("action_drug", "action_dose"))
+  expect_equal(steps_of(steps[1:8, ])$actions, data.frame(
+    action_drug = rep(c("new", "old"), each = 2), action_dose = c(1, 5)
+  ))
+  expect_output(print(steps), "Actions: new, 1 25%; new, 5 25%; old, 1 25%; old, 5 25%")
+  best <- data.frame(action_drug = c("old", "new"), action_dose = 5)
+  here <- data.frame(severity = c("low", "high"))
+  expect_equal(predict(learn_q(steps), here), best)
+  # A formula may have the parts.
+  by_parts <- learn_fitted_q(steps, ~ action_drug * severity + action_dose)
+  expect_equal(predict(by_parts, here), best)
+  expect_equal(predict(solve_mdp(estimate_model(steps)), "high"), best[2, ], ignore_attr = TRUE)
+  chooses <- function(states) {
+    data.frame(action_drug = ifelse(states$severity == "high", "new", "old"), action_dose = 5)
+  }
+  found <- evaluate_offline(steps, chooses, "is", behavior = policy_random(), replicates = 2,
+                            seed = 1)
+  expect_equal(found$estimates$estimate, 2)
+  expect_error(
+    evaluate_offline(steps, data.frame(action_drug = "new", action_dose = 7)), 'action "new, 7"'
+  )
+})

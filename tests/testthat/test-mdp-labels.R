@@ -112,3 +112,21 @@ test_that("observations of several parts are states of an estimated model, and i
     expect_equal(rollout(env, solved$policy, episodes = 1)$episodes$return, -2)
   }
 })
+
+test_that("the actions of a model may have several columns", {
+  treated <- gym_model(data.frame(
+    state = "ill", drug = c("a", "b"), dose = c(1, 1, 2, 2), next_state = "well",
+    reward = c(1, 0, 2, 5)
+  ), action = c("drug", "dose"))
+  best <- data.frame(action_drug = "b", action_dose = 2)
+  solved <- solve_mdp(treated)
+  expect_equal(predict(solved, "ill"), best)
+  expect_equal(as.data.frame(solved)[1, 3:4], best)
+  expect_equal(colnames(solved$q), c("a, 1", "a, 2", "b, 1", "b, 2"))
+  expect_equal(names(as.data.frame(treated))[1:4],
+               c("state", "action_drug", "action_dose", "next_state"))
+  played <- rollout(treated, solved$policy, episodes = 1, seed = 1, steps = TRUE)$steps
+  expect_equal(played[names(best)], best)
+  expect_equal(state_values(learn_q(treated, iterations = 1, seed = 1), TRUE)[4, 2:3], best,
+               ignore_attr = TRUE)
+})
