@@ -11,9 +11,8 @@
 #' Steps and resets of an environment go by a stream, a WebSocket of the environment's own, which
 #' takes a third of the time of an HTTP request. A session has 32 at most, for the environments that
 #' it uses most. Steps go by HTTP where there can be no stream: with https, a proxy, settings of
-#' httr or a `timeout` of less than a second, if answers are very large, and after
-#' another process has stepped the same environment. Printing a client says which way its steps go.
-#' Results are the same.
+#' httr or a `timeout` of less than a second, and after another process has stepped the same
+#' environment. Printing a client says which way its steps go. Results are the same.
 #'
 #' You can save a client with [saveRDS()], send it to another process and use it in a forked one.
 #' Each copy opens its own connection.

@@ -159,8 +159,7 @@ new_instance <- function(client, instance_id, about) {
   instance$sends_tensors <- travels_as_tensors(instance$single_action_space, about$num_envs)
   instance$spec <- read_spec(about$env_id, about)
   instance$draws <- !is.null(about$render_mode)
-  instance$streams <- pays_to_stream(observed, about$num_envs)
-  instance$takes_numbers <- instance$streams && takes_numbers(observed)
+  instance$takes_numbers <- takes_numbers(observed, about$num_envs)
   instance$done <- FALSE
   # One for each combination of a call's flags, prepared at the first such call.
   instance$resets <- vector("list", 4L)

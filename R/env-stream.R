@@ -1,18 +1,15 @@
 # The messages of steps and resets, by a stream or by HTTP, and how the answers are read. Usual
 # answers are numbers of one dtype, which R reads at once.
 
-# With more numbers in an answer HTTP is faster: R reads from a socket in pieces of 4 kB.
-most_streamed <- 8000
+# With more numbers the head of a frame would have more bytes than [numbers_message()] expects.
+most_as_float64 <- 8000
 
-# Whether the answers of so many sub-environments go by a stream.
-pays_to_stream <- function(space, num_envs) {
-  numbers <- count_numbers(space)
-  is.na(numbers) || (num_envs %||% 1L) * (numbers + 3) <= most_streamed
-}
-
-# Whether R's integers and doubles can represent a space's numbers that come as float64.
-takes_numbers <- function(space) {
-  if (inherits(space, "gym_space_discrete")) {
+# Whether answers come as float64: R's integers and doubles can represent all of them, and they fit
+# into a frame that is read at once.
+takes_numbers <- function(space, num_envs) {
+  if (!isTRUE((num_envs %||% 1L) * (count_numbers(space) + 3) <= most_as_float64)) {
+    FALSE
+  } else if (inherits(space, "gym_space_discrete")) {
     within_integer(unlist(space_bounds(space)))
   } else {
     inherits(space, "gym_space_array") && (is_float(space) || space$dtype %in% small_dtypes)

@@ -43,8 +43,7 @@ new_stream <- function(instance, state) {
   stream$failures <- 0L
   stream$used <- 0
   # Why messages go by HTTP for good, in words.
-  stream$why_http <- why_http(instance$client) %||%
-    if (!instance$streams) "its answers are large"
+  stream$why_http <- why_http(instance$client)
   stream
 }
 
@@ -271,9 +270,9 @@ finish_answer <- function(stream, begun, count, call) {
   answer <- if (length(begun) == 8 * (count %||% 0)) {
     tryCatch(suppressWarnings(read_message(stream$con, begun)), error = function(cnd) NULL)
   }
-  start <- if (is.null(answer)) begun else c(answer$first, raw(1L), answer$content)
-  if (identical(start[1L], as.raw(0x88))) {
-    if (identical(start[3:4], taken_over)) {
+  if (identical(c(answer$first, begun)[1L], as.raw(0x88))) {
+    code <- if (is.null(answer)) begun[3:4] else answer$content[1:2]
+    if (identical(code, taken_over)) {
       stream$why_http <- "another client has taken the stream over"
     }
     return(NULL)
@@ -297,24 +296,23 @@ taken_over <- as.raw(c(4001 %/% 256, 4001 %% 256))
 #' @noRd
 read_message <- function(con, begun = raw()) {
   take <- function(size) {
-    missing <- size - length(begun)
-    if (missing > 0) {
-      more <- readBin(con, "raw", missing)
-      if (length(more) < missing) stop("The stream has ended.")
-      begun <<- c(begun, more)
-    }
+    bytes <- readBin(con, "raw", size)
+    if (length(bytes) < size) stop("The stream has ended.")
+    bytes
   }
-  take(2)
+  if (!length(begun)) begun <- take(2)
   size <- as.integer(begun[[2L]])
   at <- 2
   if (size > 125) {
     at <- if (size == 126) 4 else 10
-    take(at)
+    if (length(begun) < at) begun <- c(begun, take(at - 2))
     size <- sum(as.integer(begun[3:at]) * 256^((at - 3):0))
   }
   if (size > max_answer_bytes()) abort_too_large()
-  take(at + size)
-  list(first = begun[1L], content = begun[at + seq_len(size)])
+  read <- begun[-seq_len(at)]
+  rest <- take(size - length(read))
+  # Joining pictures would take as long as reading them.
+  list(first = begun[[1L]], content = if (length(read)) c(read, rest) else rest)
 }
 
 # The bytes of an answer before its arrays.
@@ -348,12 +346,8 @@ post_message <- function(stream, message, content, head, number, call) {
   keys <- stream$keys
   number <- number %||% (keys$number <- keys$number + 1)
   # Without the head of a frame.
-  head <- c(head[length(head) - 7:0], writeBin(number, raw(), endian = "little"))
-  body <- if (length(content) < join_as_integers || length(content) %% 4L) {
-    c(head, content)
-  } else {
-    writeBin(c(words_of(head), words_of(content)), raw(), endian = "little")
-  }
+  head <- head[length(head) - 7:0]
+  body <- c(head, writeBin(number, raw(), endian = "little"), content)
   response <- send_request(
     stream$client, stream$route, "POST", body, message_type, repeatable = TRUE, call = call
   )
@@ -363,11 +357,6 @@ post_message <- function(stream, message, content, head, number, call) {
     message$request$read(read_answer(with_answer(response), "POST", call))
   }
 }
-
-# From this number of bytes on R joins them faster as integers.
-join_as_integers <- 4096L
-
-words_of <- function(bytes) readBin(bytes, "integer", length(bytes) / 4, endian = "little")
 
 #' Make the head of a message
 #' @param size The size of its content after the number, in bytes.

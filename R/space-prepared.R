@@ -17,15 +17,17 @@ array_writer.default <- function(space, n) function(values) NULL
 
 #' @exportS3Method
 array_writer.gym_space_discrete <- function(space, n) {
-  if (is.null(n) && space$n <= most_prepared && within_integer(unlist(space_bounds(space)))) {
-    discrete_writer(space)
-  } else if (is.null(n) || space$dtype == "uint64") {
+  if (!within_integer(unlist(space_bounds(space)))) {
     array_writer.default(space, n)
-  } else {
+  } else if (!is.null(n)) {
     function(values) {
       integers <- if (length(values) == n && is.null(dim(values))) small_integers(values)
-      if (!is.null(integers)) int64_bytes(integers)
+      if (!is.null(integers)) integer_bytes(integers)
     }
+  } else if (space$n <= most_prepared) {
+    discrete_writer(space)
+  } else {
+    array_writer.default(space, n)
   }
 }
 
@@ -54,7 +56,7 @@ most_prepared <- 1024
 
 discrete_writer <- function(space) {
   values <- as.integer(space$start + (seq_len(space$n) - 1L))
-  bytes <- lapply(values, int64_bytes)
+  bytes <- lapply(values, integer_bytes)
   before <- space$start - 1
   n <- length(bytes)
   function(value) {
@@ -65,7 +67,7 @@ discrete_writer <- function(space) {
   }
 }
 
-int64_bytes <- function(integers) writeBin(integers, raw(), size = 8L, endian = "little")
+integer_bytes <- function(integers) writeBin(integers, raw(), endian = "little")
 
 # Checks of batches ------------------------------------------------------------------------
 

@@ -29,6 +29,20 @@ test_that("a stream says what HTTP says, of every kind of space", {
   }
 })
 
+test_that("frames of any size are read: of 1,142 sub-environments as float64, of more as float32", {
+  for (n in c(1142, 1143)) {
+    ways <- lapply(list(test_client(), http_client()), function(client) {
+      local_env("CartPole-v1", num_envs = n, seed = 1, client = client, frame = parent.frame(3))
+    })
+    expect_identical(ways[[1]]$reset(), ways[[2]]$reset())
+    steps <- lapply(ways, function(env) env$step(rep_len(0:1, n)))
+    expect_identical(steps[[1]], steps[[2]])
+    layout <- ways[[1]]$.__enclos_env__$private$instance$stream$layout$step
+    expect_identical(layout$observation$dtype, if (n == 1142) "F64" else "F32")
+    expect_false(is.null(connection_of(ways[[1]])))
+  }
+})
+
 test_that("actions that are unusual are checked and sent by the stream", {
   env <- local_env(seed = 1)
   env$reset()

@@ -109,7 +109,7 @@ class StreamClient:
 
     def step(self, *actions, **how):
         """Take a step with actions of a Discrete space."""
-        return self.ask(STEP, ARRAYS, struct.pack(f"<{len(actions)}q", *actions), **how)
+        return self.ask(STEP, ARRAYS, struct.pack(f"<{len(actions)}i", *actions), **how)
 
     def arrays(self, content, what="step"):
         """Return the arrays of an answer, as lists."""

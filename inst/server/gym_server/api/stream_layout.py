@@ -145,7 +145,7 @@ class StreamLayout:
         self.num_envs = instance.config.num_envs
         self._by_column = by_column
         self._as_float64 = as_float64 and _fits_float64(instance.single_observation_space)
-        self._action = spaces.tensor_shapes(instance.single_action_space, "action")
+        self._action = spaces.tensor_shapes(instance.single_action_space, "action", short=True)
         self._observation = spaces.tensor_shapes(instance.single_observation_space, "observation")
         # Sub-environments end one after another, so the numbers of rows follow each other.
         self.action = lru_cache(_MOST_LAYOUTS)(self._of_action)

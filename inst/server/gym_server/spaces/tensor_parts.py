@@ -83,11 +83,17 @@ def travels_as_tensors(space: Space) -> bool:
     return all(isinstance(leaf.space, (*ARRAYS, Text)) for leaf in _leaves(space, ""))
 
 
-def tensor_shapes(space: Space, name: str) -> Shapes | None:
-    """Return the dtype and shape of each tensor of a member; None if they vary."""
+def tensor_shapes(space: Space, name: str, short: bool = False) -> Shapes | None:
+    """Return the dtype and shape of each tensor of a member; None if they vary.
+
+    Args:
+        space: the space.
+        name: the name of the tensor, or of the tensors of its parts.
+        short: whether Discrete members are int32 where these can represent them.
+    """
     leaves = _leaves(space, name)
     try:
-        return {leaf.name: (tensor_name(leaf.dtype), leaf.shape) for leaf in leaves}
+        return {leaf.name: (leaf.dtype_name(short), leaf.shape) for leaf in leaves}
     except KeyError:
         return None
 
@@ -136,6 +142,14 @@ class _Leaf:
             self.dtype = wide_dtype(space) if isinstance(space, Discrete) else space.dtype
             self._bounds = bounds_of(space)
 
+    def dtype_name(self, short: bool) -> str:
+        """Return the name of the tensor's dtype, see ``tensor_shapes()``."""
+        if short and isinstance(self.space, Discrete):
+            # Without the smallest int32, which is R's NA.
+            if self._bounds.low > -(2**31) and self._bounds.high < 2**31:
+                return _SHORT
+        return tensor_name(self.dtype)
+
     def write(self, value: Any, parts: Parts, is_batch: bool) -> None:
         """Add the part of a member or batch to others."""
         if isinstance(self.space, Text):
@@ -174,8 +188,7 @@ class _Leaf:
         shape = self.shape if rows.number is None else (rows.number, *self.shape)
         wanted = tensor_name(self.dtype)
         is_discrete = isinstance(self.space, Discrete)
-        # R has only 32-bit integers, and sends batches of them.
-        is_short = is_discrete and rows.number is not None and (wanted, tensor.dtype) == _SHORT
+        is_short = is_discrete and tensor.dtype == _SHORT
         if tensor.shape != shape or (tensor.dtype != wanted and not is_short):
             reason = f"{wanted} {list(shape)} is needed"
             is_batch = rows.number is not None and len(tensor.shape) > 0
@@ -201,5 +214,5 @@ class _Leaf:
             raise
 
 
-# The dtypes of a tensor, by name: that of a space, and one that is accepted instead.
-_SHORT = ("I64", "I32")
+# Also accepted for Discrete members: R has only 32-bit integers.
+_SHORT = "I32"

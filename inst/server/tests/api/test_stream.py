@@ -92,7 +92,7 @@ def test_arrays_of_actions_are_taken_and_a_mask_selects_sub_environments(shared,
     wanted = data_of(by_http(shared, f"{theirs}/step/", action=[0, 1, 1])[1])
     assert (content == padded(wanted)) is (order is None)
     assert stream.layout["step"]["observation"]["shape"] == ([3, 4] if order is None else [4, 3])
-    masked = bytes([1, 0, 1, 0, 0, 0, 0, 0]) + struct.pack("<2q", 1, 0)
+    masked = bytes([1, 0, 1, 0, 0, 0, 0, 0]) + struct.pack("<2i", 1, 0)
     content = stream.ask(STEP, ARRAYS, masked, flags=8)[2]
     wanted = by_http(shared, f"{theirs}/step/", action=[1, 0], step_mask=[True, False, True])[1]
     assert sorted(content) == sorted(padded(data_of(wanted)))
@@ -164,11 +164,11 @@ def test_a_message_by_http_is_answered_as_by_a_stream(shared, opened):
             answer = connection.getresponse()
             return answer.status, answer.headers["Content-Type"], answer.read()
 
-    actions = struct.pack("<3q", 0, 1, 1)
+    actions = struct.pack("<3i", 0, 1, 1)
     for what, form, content, flags in (
         (RESET, JSON_BODY, b"{}", 0),
         (STEP, ARRAYS, actions, 0),
-        (STEP, ARRAYS, bytes([1, 0, 1]) + bytes(5) + actions[:16], 8),
+        (STEP, ARRAYS, bytes([1, 0, 1]) + bytes(5) + actions[:8], 8),
     ):
         message = stream.message(what, form, content, flags)
         stream.socket.sendall(frame(message))
@@ -204,10 +204,10 @@ def test_errors_are_those_of_http_and_the_stream_goes_on(shared, opened):
     assert stream.reset(seed=-1)[2]["code"] == "invalid_parameter"
     stream.reset()
     for content, code in (
-        (struct.pack("<q", 7), "action_not_in_space"),
-        (b"1234", "malformed_message"),
+        (struct.pack("<i", 7), "action_not_in_space"),
+        (bytes(3), "malformed_message"),
         (b"", "malformed_message"),
-        (bytes(16), "malformed_message"),
+        (bytes(8), "malformed_message"),
     ):
         form, status, answer, _ = stream.ask(STEP, ARRAYS, content)
         assert (form, status, answer["code"]) == (JSON_BODY, 400, code)
@@ -294,7 +294,7 @@ def test_a_stop_of_the_server_ends_streams_after_their_answers(serve):
     url = server.create("faulty_envs:Counting-v0", kwargs={"seconds": 1})
     with contextlib.closing(StreamClient(("127.0.0.1", server.port), url)) as stream:
         stream.reset()
-        stream.socket.sendall(frame(stream.message(STEP, ARRAYS, bytes(8))))
+        stream.socket.sendall(frame(stream.message(STEP, ARRAYS, bytes(4))))
         assert server.post("/v1/shutdown/")[0] == 200
         assert stream.answer()[1] == 200
         assert stream.closing()[0] == 1001
@@ -313,10 +313,10 @@ def test_a_message_that_was_cut_at_any_byte_is_done_once(shared, opened):
     stream = opened()
     stream.reset()
     stream.close()
-    size = len(frame(stream.message(STEP, ARRAYS, bytes(8), number=0)))
+    size = len(frame(stream.message(STEP, ARRAYS, bytes(4), number=0)))
     for after in range(size + 1):
         one = opened(stream.url)
-        message = frame(one.message(STEP, ARRAYS, bytes(8), number=after + 2))
+        message = frame(one.message(STEP, ARRAYS, bytes(4), number=after + 2))
         one.socket.sendall(message[:after])
         if after % 2:
             one.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -335,7 +335,7 @@ def test_any_bytes_are_answered_or_end_the_stream_and_the_instance_lives(opened)
 
     first = opened()
     first.reset()
-    usual = frame(first.message(STEP, ARRAYS, bytes(8), number=3))
+    usual = frame(first.message(STEP, ARRAYS, bytes(4), number=3))
 
     @st.composite
     def frames(draw):

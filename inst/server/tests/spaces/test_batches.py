@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from gymnasium.spaces import Box, Discrete, MultiBinary
+from gymnasium.spaces import Box, Discrete, MultiBinary, MultiDiscrete
 from random_spaces import random_member, random_space, same
 
 from gym_server import spaces
@@ -67,10 +67,28 @@ def test_every_way_to_write_a_sub_env_is_read():
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
-def test_discrete_sub_envs_may_be_32_or_64_bits_wide(dtype):
-    parts = Parts({"action": Tensor.of(np.array([0, 2], dtype))})
-    batch = spaces.tensor_reader(Discrete(3, dtype=np.int8), "action")(parts, spaces.Rows(2, ""))
-    assert (batch.dtype, batch.tolist()) == (np.int8, [0, 2])
+@pytest.mark.parametrize(("sent", "rows"), [(2, None), ([0, 2], 2)])
+def test_discrete_actions_may_be_32_or_64_bits_wide(dtype, sent, rows):
+    parts = Parts({"action": Tensor.of(np.array(sent, dtype))})
+    read = spaces.tensor_reader(Discrete(3, dtype=np.int8), "action")(parts, spaces.Rows(rows, ""))
+    assert (read.dtype, read.tolist()) == (np.int8, sent)
+
+
+@pytest.mark.parametrize(
+    ("space", "dtype"),
+    [
+        (Discrete(3, start=-1), "I32"),
+        (Discrete(3, dtype=np.uint64), "I32"),
+        (Discrete(2, start=2**31 - 2), "I32"),
+        (Discrete(2, start=2**31 - 1), "I64"),
+        (Discrete(2, start=1 - 2**31), "I32"),
+        # R's smallest integer is NA.
+        (Discrete(2, start=-(2**31)), "I64"),
+        (MultiDiscrete([3, 3]), "I64"),
+    ],
+)
+def test_short_tensors_of_discrete_actions_are_integers_of_r(space, dtype):
+    assert spaces.tensor_shapes(space, "action", short=True)["action"][0] == dtype
 
 
 @pytest.mark.parametrize("action", [-1, 3])
@@ -88,8 +106,7 @@ def test_unsigned_discrete_sub_envs_are_unsigned():
     assert parts.tensors["action"].dtype == "U64"
     assert spaces.tensor_reader(space, "action")(parts, spaces.Rows(2, "")).dtype == np.uint64
     short = Parts({"action": Tensor.of(np.array([0, 2], np.int32))})
-    with pytest.raises(NotInSpace, match=r"U64 \[2\] is needed"):
-        spaces.tensor_reader(space, "action")(short, spaces.Rows(2, ""))
+    assert spaces.tensor_reader(space, "action")(short, spaces.Rows(2, "")).dtype == np.uint64
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
