@@ -144,11 +144,14 @@ class _Leaf:
 
     def dtype_name(self, short: bool) -> str:
         """Return the name of the tensor's dtype, see ``tensor_shapes()``."""
-        if short and isinstance(self.space, Discrete):
-            # Without the smallest int32, which is R's NA.
-            if self._bounds.low > -(2**31) and self._bounds.high < 2**31:
-                return _SHORT
-        return tensor_name(self.dtype)
+        # Without the smallest int32, which is R's NA.
+        is_short = (
+            short
+            and isinstance(self.space, Discrete)
+            and -(2**31) < self._bounds.low
+            and self._bounds.high < 2**31
+        )
+        return _SHORT if is_short else tensor_name(self.dtype)
 
     def write(self, value: Any, parts: Parts, is_batch: bool) -> None:
         """Add the part of a member or batch to others."""
