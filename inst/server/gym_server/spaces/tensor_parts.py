@@ -148,7 +148,7 @@ class _Leaf:
         is_short = (
             short
             and isinstance(self.space, Discrete)
-            and -(2**31) < self._bounds.low
+            and self._bounds.low > -(2**31)
             and self._bounds.high < 2**31
         )
         return _SHORT if is_short else tensor_name(self.dtype)
