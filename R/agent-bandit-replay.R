@@ -24,6 +24,8 @@ replay_bandit <- function(data, method, confidence, seed, call) {
   )
   label <- paste0(if (method == "linucb") "LinUCB" else "linear Thompson sampling",
                   ", confidence ", number_text(confidence))
+  # The policy cannot be learned again in folds: that would be another replay.
+  context$label <- label
   structure(
     list(
       curve = data.frame(
@@ -31,7 +33,7 @@ replay_bandit <- function(data, method, confidence, seed, call) {
       ),
       values = played$weights, label = label, learners = 1L, seed = seed, env_id = "logged data",
       reward = mean(played$reward), se = stats::sd(played$reward) / sqrt(seen), seen = seen,
-      rows = length(steps$step), policy = bandit_policy(context, played$weights, steps, label)
+      rows = length(steps$step), policy = new_rule(context, list(played$weights), steps, NULL)
     ),
     class = "gym_bandit_learning"
   )
@@ -91,10 +93,4 @@ replay_steps <- function(x, steps, used, draws, confidence) {
   }
   dimnames(weights) <- list(colnames(x), row_texts(steps$actions))
   list(reward = steps$reward[seen], weights = weights)
-}
-
-# It cannot be learned again in folds: that would be another replay.
-bandit_policy <- function(context, weights, steps, label) {
-  context$label <- label
-  new_rule(context, list(weights), steps, NULL)
 }

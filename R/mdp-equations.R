@@ -20,9 +20,21 @@ chain_solver <- function(weight, call) {
       return(swept)
     }
     tryCatch({
-      solver <<- solver %||% if (is.matrix(weight)) full_solver(weight) else sparse_solver(weight)
+      solver <<- solver %||% if (is.matrix(weight)) {
+        equations <- diag(nrow(weight)) - weight
+        function(rewards) solve(equations, rewards, tol = 0)
+      } else {
+        sparse_solver(weight)
+      }
       solved_values(weight, rewards, solver)
-    }, error = function(e) abort_unsolved(length(rewards), call))
+    }, error = function(e) {
+      abort_wrong(
+        "discount", NULL, call,
+        'The equations of {count_of(length(rewards), "state")} cannot be solved: they need too much
+         memory, or episodes hardly ever end.',
+        i = "Give a lower `discount`, or a `horizon`."
+      )
+    })
   }
 }
 
@@ -33,7 +45,8 @@ chain_solver <- function(weight, call) {
 #' bounds of the remaining growth are close to each other, which is often the case sooner.
 #' @return The values, or `NULL` if so many sweeps would be needed that solving is faster.
 #' @noRd
-swept_values <- function(weight, rewards, enough = 1e-15) {
+swept_values <- function(weight, rewards) {
+  enough <- 1e-15
   most <- 500L
   every <- 25L
   bounded <- growth_bounds(weight)
@@ -104,11 +117,6 @@ solved_values <- function(weight, rewards, solver) {
   values
 }
 
-full_solver <- function(weight) {
-  equations <- diag(nrow(weight)) - weight
-  function(rewards) solve(equations, rewards, tol = 0)
-}
-
 sparse_solver <- function(weight) {
   all <- seq_len(nrow(weight))
   equations <- Matrix::sparseMatrix(
@@ -124,13 +132,4 @@ sparse_solver <- function(weight) {
     values[factors@q + 1L] <- as.vector(Matrix::solve(factors@U, half))
     values
   }
-}
-
-abort_unsolved <- function(states, call) {
-  abort_wrong(
-    "discount", NULL, call,
-    'The equations of {count_of(states, "state")} cannot be solved: they need too much memory, or
-     episodes hardly ever end.',
-    i = "Give a lower `discount`, or a `horizon`."
-  )
 }

@@ -156,7 +156,7 @@ check_order <- function(steps, x, call) {
   }
 }
 
-# As far as is known, arriving at a state that was never left ends the episode.
+# Nothing is known of a state that no step has left: arriving there ends the episode.
 end_at_unknown <- function(steps) {
   stuck <- !steps$terminated & !steps$next_state %in% steps$state
   count <- length(unique(steps$next_state[stuck]))

@@ -26,7 +26,8 @@ model_env <- function(model, num_envs = NULL) {
   make <- function(...) {
     gym_env(
       reset = function(self) {
-        self$row <- draw_start(moves, self$num_envs %||% 1L)
+        drawn <- findInterval(stats::runif(self$num_envs %||% 1L), moves$start) + 1L
+        self$row <- pmin(drawn, moves$last_start)
         self$over <- logical(length(self$row))
         moves$states[self$row]
       },
@@ -110,10 +111,6 @@ moves_of <- function(model) {
     first = first, last = last,
     next_row = table$to, reward = table$reward, terminated = table$terminated
   )
-}
-
-draw_start <- function(moves, n) {
-  pmin(findInterval(stats::runif(n), moves$start) + 1L, moves$last_start)
 }
 
 draw_transition <- function(moves, pair) {

@@ -106,9 +106,11 @@ solve_mdp <- function(model, policy = NULL, discount = 1, horizon = NULL,
   } else {
     best_endless_values(backup, discount, method, notes$see, call)
   }
-  if (is.null(policy) && !is.finite(start_mean(model, found$values))) {
-    abort_no_end(model, call)
-  }
+  abort_if(
+    is.null(policy) && !is.finite(start_mean(model, found$values)), "discount", 1, call,
+    "Episodes of {model$spec$id} never end, and without a discount their values are infinite.",
+    i = "Give a `discount` below 1, or a `horizon`."
+  )
   new_solution(model, backup, found, policy, probabilities, discount, horizon, method, notes)
 }
 
@@ -116,14 +118,6 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   if (!is_number(x) || x <= 0 || x > 1) {
     abort_argument(x, "a number above 0 and at most 1", arg, call)
   }
-}
-
-abort_no_end <- function(model, call) {
-  abort_wrong(
-    "discount", 1, call,
-    "Episodes of {model$spec$id} never end, and without a discount their values are infinite.",
-    i = "Give a `discount` below 1, or a `horizon`."
-  )
 }
 
 # Keeps the values of each sweep, if requested, and the actions.
@@ -166,7 +160,10 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
     actions[rowSums(possible_of(backup)) == 0] <- NA
     if (is.null(horizon)) {
       probabilities <- choice_probabilities(backup, choice)
-      policy <- table_policy_of(model, probabilities)
+      # Any action will do in a state without actions.
+      taken <- probabilities
+      taken[rowSums(taken) == 0, 1L] <- 1
+      policy <- policy_bind(policy_table(taken), model)
     }
   }
   limit <- model$spec$max_episode_steps
@@ -186,13 +183,6 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
     ),
     class = "gym_solution"
   )
-}
-
-# A policy that takes the most likely actions, with the model's spaces.
-table_policy_of <- function(model, probabilities) {
-  nowhere <- rowSums(probabilities) == 0
-  probabilities[nowhere, 1L] <- 1
-  policy_bind(policy_table(probabilities), model)
 }
 
 start_mean <- function(model, values) {

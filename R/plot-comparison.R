@@ -241,8 +241,6 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
 
 score_label <- function(x) if (is.null(x$reference)) "mean return" else "normalised score"
 
-statistic_names <- c(mean = "mean", median = "median", iqm = "interquartile mean")
-
 # Rows whose names fit a third of four inches.
 named_rows <- function() ggplot2::scale_y_discrete(labels = function(at) broken_texts(at, 18))
 
@@ -255,7 +253,9 @@ scores_picture <- function(x) {
   )) +
     ggplot2::geom_pointrange() +
     ggplot2::facet_wrap(
-      ggplot2::vars(.data$statistic), ncol = 1L, labeller = ggplot2::as_labeller(statistic_names)
+      ggplot2::vars(.data$statistic), ncol = 1L, labeller = ggplot2::as_labeller(
+        c(mean = "mean", median = "median", iqm = "interquartile mean")
+      )
     ) +
     ggplot2::scale_colour_manual(values = named_colours(unique(x$table$training)), guide = "none") +
     named_rows() +
@@ -297,7 +297,7 @@ improvement_picture <- function(x) {
 }
 
 reached_picture <- function(x) {
-  # Steps drawn with corners, so that the band has them, too.
+  # Add the corners of the steps, because the band needs them, too.
   rows <- do.call(rbind, lapply(split(x$profile, list(x$profile$training, x$profile$env_id),
                                       drop = TRUE), function(rows) {
     n <- nrow(rows)

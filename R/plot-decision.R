@@ -2,8 +2,8 @@
 #'
 #' Show the actions of a policy over two parts of the observation. The colour is the output of a
 #' network that is rounded to one of two actions, with a line at one half; or the action; or the
-#' value of an action that is a Box, with a line at the middle of its bounds. Regions carry the
-#' names of their actions. The path of an episode starts at the ring and ends at the cross.
+#' value of an action that is a Box, with a line at the middle of its bounds. The path of an episode
+#' starts at the ring and ends at the cross.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -56,8 +56,7 @@ path_layers <- function(path) {
 
 #' Compute the data of a plot of a decision map
 #' @return A list: `points` (data frame `x`, `y`, `shown`, a number or a factor), `fill` (the colour
-#'   scale), `border` (the level of the border line, or `NULL`), `regions` (data frame: `x`, `y`,
-#'   `label`).
+#'   scale), `border` (the layer of the border line, or `NULL`).
 #' @noRd
 decision_plot_data <- function(x) {
   points <- stats::setNames(x$grid, c("x", "y", "shown"))
@@ -187,7 +186,6 @@ taken_layers <- function(data) {
 #' @return As [solution_plot_data()], with `action`, a number or `NA`, instead of values, and the
 #'   `numbers` and `labels` of all actions.
 #' @noRd
-# Where the states stand, as solution_plot_data() returns it.
 state_map_data <- function(x, columns, directions, passenger, destination,
                            call = rlang::caller_env()) {
   cells <- data.frame(x$grid, ink = "black")

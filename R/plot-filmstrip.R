@@ -1,4 +1,4 @@
-# An episode on paper: some of its frames side by side.
+# Some frames of an episode, side by side.
 
 #' Pick evenly spaced frames, including the first and the last
 #' @param frames Of class `gym_frames`.
@@ -72,8 +72,8 @@ busy_span <- function(busy) {
   seq(max(1, min(which(busy)) - around), min(length(busy), max(which(busy)) + around))
 }
 
-# Devices drop most pixels of a large picture, and thin lines with them, so it is made smaller
-# first: it keeps this width or up to twice as much.
+# Graphics devices drop most pixels of a large picture, and thin lines with them. So make it smaller
+# first: at least this wide, and less than twice as wide.
 most_pixels <- 300L
 
 #' Make a picture smaller: each pixel the mean of a square
@@ -94,7 +94,8 @@ shrink <- function(picture, by) {
 }
 
 # The size of a filmstrip on paper: as wide as the text of a page.
-filmstrip_size <- function(stills, width = 6.5) {
+filmstrip_size <- function(stills) {
+  width <- 6.5
   pictures <- crop_blank(lapply(stills$frames, unclass))
   columns <- film_columns(pictures)
   rows <- ceiling(length(pictures) / columns)

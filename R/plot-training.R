@@ -131,12 +131,12 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
   target <- finite_target(object$target)
   ggplot2::ggplot(object$episodes, ggplot2::aes(.data$round, .data$return)) +
     target_line(target) +
-    # With a seed of its own it leaves R's generator as it is.
+    # With its own seed the jitter leaves R's generator unchanged.
     ggplot2::geom_point(
       ggplot2::aes(colour = "episode"), size = 1.8,
       position = ggplot2::position_jitter(width = 0.25, height = 0, seed = 1)
     ) +
-    # ggplot2 has a message for a line of one point.
+    # ggplot2 shows a message for a line of one point.
     (if (nrow(means) > 1L) ggplot2::geom_line(
       ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means,
       linewidth = 0.7

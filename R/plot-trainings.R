@@ -150,9 +150,6 @@ common_target <- function(trainings) {
   if (length(targets) == 1L && length(targets[[1L]])) finite_target(targets[[1L]])
 }
 
-# The number of places along the axis at which the seeds are compared.
-curve_places <- 200L
-
 evaluation_curves <- function(x, label, call) {
   each <- lapply(each_training(x), function(training) {
     data.frame(steps = evaluation_steps(training), mean_return = training$evaluations$mean_return)
@@ -179,7 +176,7 @@ trainings_curve <- function(each, label, last, training) {
   steps <- if (length(each) == 1L) {
     each[[1L]]$steps
   } else {
-    seq(min(from, max(ends)), max(ends), length.out = curve_places)
+    seq(min(from, max(ends)), max(ends), length.out = 200L)
   }
   steps <- sort(unique(c(steps, first_end, if (length(steps) > 1L) last)))
   values <- vapply(each, returns_at, numeric(length(steps)), steps)
@@ -258,10 +255,10 @@ diagnostics_picture <- function(x, call = rlang::caller_env()) {
     data.frame(steps = x$history$steps, name = name, value = x$history[[name]])
   }))
   rows$name <- factor(rows$name, names)
-  # Random episodes, which only supplied the first moments of observations, taught nothing.
+  # The agent learned nothing from the first, random episodes and has no numbers there.
   rows <- rows[is.finite(rows$value), ]
-  # A number that stays the same would lie on an axis from half below it to half above it, where
-  # that of a small one seems to be 0.
+  # By default ggplot2 makes the axis of a constant 0.1 long, on which a small number looks like 0.
+  # Here it reaches from half the number to one and a half.
   spread <- stats::ave(rows$value, as.character(rows$name), FUN = function(x) diff(range(x)))
   constant <- rows[spread == 0, ]
   ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +

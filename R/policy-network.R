@@ -115,7 +115,11 @@ policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL
   check_flag(bias)
   check_flag(normalize)
   check_above_zero(clip_obs, max = Inf)
-  output <- check_output(output)
+  output <- if (isTRUE(is.na(output))) {
+    NA_character_
+  } else {
+    check_choice(output, c("greedy", "softmax", "gaussian", "epsilon-greedy"))
+  }
   last <- if (identical(output, "greedy")) "logistic" else "identity"
   activation <- layer_activations(activation %||% c("tanh", last), sizes)
   last <- activation[[length(activation)]]
@@ -173,13 +177,6 @@ new_network <- function(sizes, activation, bias, normalize) {
     ),
     class = c("gym_policy_network", "gym_policy")
   )
-}
-
-check_output <- function(output, call = rlang::caller_env()) {
-  if (length(output) == 1L && is.na(output)) {
-    return(NA_character_)
-  }
-  check_choice(output, c("greedy", "softmax", "gaussian", "epsilon-greedy"), "output", call)
 }
 
 # One standard deviation for each output.

@@ -5,8 +5,6 @@
 #' @exportS3Method
 init_space.gym_space_box <- function(space) {
   space$shape <- shape_from_json(space$shape)
-  # Classic servers send no dtype, and their numbers are JSON's, doubles.
-  space$dtype <- space$dtype %||% "float64"
   space$low <- bound_from_json(space$low)
   space$high <- bound_from_json(space$high)
   n <- prod(space$shape)

@@ -157,7 +157,7 @@ check_batch <- function(space, batch, values, n, call, sub_envs = NULL, bounds =
     problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
     abort_space(batch, values, problem, call)
   }
-  # A number of an integer64 loses the class.
+  # A number taken from an integer64 loses the class.
   if (!is.na(given) && !is_integer64(values)) {
     for (i in seq_len(n)) {
       tryCatch(

@@ -1,5 +1,5 @@
 # Functions that write actions and check batches, prepared once and called in every step. They
-# handle the usual values; anything else takes the general way, which finds what is wrong with it.
+# handle the usual values. All others go to check_value(), which finds what is wrong with them.
 
 is_float <- function(space) startsWith(space$dtype %||% "", "float")
 
@@ -51,7 +51,7 @@ array_writer.gym_space_box <- function(space, n) {
 # The largest float32. Larger numbers are refused.
 float_limits <- c(float32 = 3.4028234e38, float64 = .Machine$double.xmax)
 
-# The bytes of so many actions are prepared.
+# The bytes of each action are prepared, if there are at most so many.
 most_prepared <- 1024
 
 discrete_writer <- function(space) {

@@ -48,7 +48,7 @@ sample_stack <- function(space, n, stacked = is_stackable(space)) {
 stack_values <- function(space, values) {
   rank <- length(space$shape)
   if (length(values) == 1L && rank <= 1L && is.numeric(value <- values[[1L]])) {
-    # The usual batch of one, in a fifth of the time.
+    # Most batches have one value; this takes a fifth of the time.
     labels <- names(value)
     value <- as.vector(value)
     if (rank) value <- matrix(value, 1L, dimnames = if (length(labels)) list(NULL, labels))

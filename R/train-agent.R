@@ -257,9 +257,12 @@ training_settings <- function(given, kwargs, client, call) {
   if (is.null(given$seeds)) settings <- with_checkpoint(settings, call)
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% given$seeds)
   settings$model <- if (online) judging_model(settings, client)
-  settings["eval_steps"] <- list(steps_between_evaluations(settings$model, settings$max_steps))
+  known <- !is.null(settings$model)
+  settings["eval_steps"] <- list(
+    if (known) steps_between_evaluations(settings$model, settings$max_steps)
+  )
   # `learn_q("Taxi-v4")` is `learn_q(env_model("Taxi-v4"))`.
-  settings$from_model <- samples_model(settings, wants_random_map(env, kwargs))
+  settings$from_model <- known && samples_model(settings, wants_random_map(env, kwargs))
   settings$played <- if (settings$from_model) {
     list(env = model_to_sample(settings, call))
   } else {

@@ -36,7 +36,8 @@ read_checkpoint <- function(path, call) {
 }
 
 write_checkpoint <- function(path, state) {
-  state <- serialize(state, NULL)
+  # In the machine's own order of bytes this takes half the time.
+  state <- serialize(state, NULL, xdr = FALSE)
   file <- structure(
     list(
       format = checkpoint_format, version = as.character(utils::packageVersion("gym")),
@@ -44,7 +45,7 @@ write_checkpoint <- function(path, state) {
     ),
     class = "gym_checkpoint"
   )
-  replace_content(path, serialize(file, NULL))
+  replace_content(path, serialize(file, NULL, xdr = FALSE))
 }
 
 #' Replace the content of a file, completely or not at all

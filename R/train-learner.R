@@ -241,8 +241,8 @@ samples_model <- function(settings, draws_map) {
     settings$agent$mask, settings$num_workers,
     intersect(setdiff(how_made(), "max_episode_steps"), names(settings$kwargs))
   )
-  settings$may_sample && !is.null(settings$model) && rlang::is_string(env) &&
-    !is_registered(env) && !draws_map && is.null(settings$callback) && !length(needs_server)
+  settings$may_sample && rlang::is_string(env) && !is_registered(env) && !draws_map &&
+    is.null(settings$callback) && !length(needs_server)
 }
 
 model_to_sample <- function(settings, call) {
@@ -287,12 +287,9 @@ exact_limit <- function(model, max_steps) {
 #' Choose it so that the evaluations take about a tenth of the time. Use counts and not a clock, so
 #' that a seed always gives the same result. A step takes about as long as the new values of
 #' 500 states. Where all the sweeps of an evaluation together take a millisecond, none is left out.
-#' @return A number of steps; `NULL` without a model.
+#' @return A number of steps.
 #' @noRd
 steps_between_evaluations <- function(model, max_steps) {
-  if (is.null(model)) {
-    return()
-  }
   limit <- exact_limit(model, max_steps)
   states <- model$backup$states
   # Without a limit equations are solved, which takes about as long as a sweep for each state.
