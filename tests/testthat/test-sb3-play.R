@@ -31,6 +31,15 @@ test_that("a policy for pictures plays whole games in its own process, and is ke
   seen <- as.matrix(steps[grep("^obs_", names(steps))])
   pictures <- aperm(array(t(seen), c(84, 84, 4, nrow(seen))), 4:1)
   expect_identical(predict(trained, pictures), steps$action)
+
+  # An interrupt keeps the games that are over.
+  local_functions(progress_bar = function(...) function(...) rlang::interrupt())
+  expect_message(
+    short <- rollout("ALE/Pong-v5", trained, 1000, seed = 3, max_num_frames_per_episode = 80),
+    class = "gym_message_interrupted"
+  )
+  expect_true(short$interrupted)
+  expect_true(nrow(short$episodes) %in% 1:999)
 })
 
 test_that("environments that Python cannot make, and policies that R asks, are refused", {
