@@ -38,7 +38,7 @@
 #' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
 #'   as [policy_random()] or a [policy_table()]; a function of a data frame of states that returns
 #'   an action for each row, or a matrix with the probability of each action; or one action, which
-#'   is then always taken.
+#'   is then always taken. Actions of several parts are data frames with the columns of the parts.
 #' @param method The methods, strings. The default is all of them.
 #' @param behavior How the actions of the data were chosen: a formula of the state, such as `~
 #'   severity + age`, for a logistic regression on these columns; or a policy as `policy`. `NULL`,

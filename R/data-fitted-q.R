@@ -27,8 +27,9 @@
 #'
 #' @param data Steps: the result of [steps_data()], a data frame with its columns, or a [rollout()]
 #'   with `steps = TRUE`.
-#' @param formula A formula with `action` and columns of the state on its right side. `NULL`, the
-#'   default, is described below.
+#' @param formula A formula with `action` and columns of the state on its right side; of an action
+#'   with several parts also the columns of these, such as `action_dose`. `NULL`, the default, is
+#'   described below.
 #' @param model A function of a formula and data that fits a model. `NULL`, the default, is
 #'   described below.
 #' @param discount The discount, a number above 0 and at most 1, the default.
@@ -42,7 +43,8 @@
 #'   chooses the best actions for the other half, whose values are then not too large by chance (van
 #'   Hasselt 2010).
 #' @return A policy of class `gym_policy_fitted`. [predict()][predict.gym_policy()] takes a data
-#'   frame of states and returns their actions, with `type = "output"` the values of all actions.
+#'   frame of states and returns their actions (a data frame, if an action has several parts), with
+#'   `type = "output"` the values of all actions.
 #'   [rollout()] plays it. With a horizon `predict()` needs the column `step`, too. [rollout()]
 #'   counts the steps of each episode, and goes on as in the last step after the horizon.
 #'   [state_values()] returns the values of the states of the data. It takes the most frequent

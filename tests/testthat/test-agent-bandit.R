@@ -142,3 +142,9 @@ test_that("a replay needs logged data, and other methods a bandit", {
   expect_error(learn_bandit(bandit(3), "linucb"), "logged steps")
   expect_error(learn_bandit(logged_clicks(10), "ucb"), "\"linucb\"")
 })
+
+test_that("data without probabilities is replayed without a warning", {
+  set.seed(1)
+  clicks <- data.frame(episode = 1:100, age = runif(100), action = 0:1, reward = 0:1)
+  expect_warning(learn_bandit(clicks, "linucb", seed = 1), NA)
+})
