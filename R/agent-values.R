@@ -49,7 +49,11 @@ agent_start.gym_value_learner <- function(agent, policy) {
   abort_if(
     !inherits(policy$action_space, "gym_space_discrete"), "env", NULL, NULL,
     "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
-    i = "`search_ars()` and `search_cem()` learn actions of a Box."
+    i = if (is.null(space_index(policy$action_space))) {
+      "`search_ars()` and `search_cem()` learn actions of a Box."
+    } else {
+      "`learn_q()` learns such actions from data: a `rollout()` with `steps = TRUE`."
+    }
   )
   agent$spaces <- policy[c("observation_space", "action_space")]
   agent$basis <- basis_of(agent$features, policy$observation_space, NULL)

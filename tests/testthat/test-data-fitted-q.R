@@ -117,6 +117,7 @@ test_that("a rule plays actions of several parts", {
     solved <- as.data.frame(solve_mdp(estimate_model(played), discount = 0.5))
     expect_equal(unlist(solved[2, 3:4]), c(1, 2), ignore_attr = TRUE)
   }
+  expect_error(learn_q(env, iterations = 1), "learns such actions from data")
 })
 
 test_that("a rule with a horizon counts the steps of each episode that it plays", {
