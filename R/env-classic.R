@@ -298,10 +298,6 @@ upload <- function(x, training_dir, api_key = NULL, algorithm_id = NULL) {
 #' shutdown_server(server)
 shutdown_server <- function(x) {
   check_client(x)
-  response <- with_answer(send_request(x, "/v1/shutdown/", body = json_body(NULL)))
-  # The original server answers with plain text instead of JSON.
-  if (response$status_code != 200L) {
-    read_answer(response, "POST")
-  }
+  post_answer(x, "/v1/shutdown/")
   invisible()
 }

@@ -1,3 +1,63 @@
+test_that("a client prints its address", {
+  expect_output(
+    print(create_GymClient("http://127.0.0.1:5000")), "<GymClient: http://127.0.0.1:5000>",
+    fixed = TRUE
+  )
+})
+
+test_that("a slash at the end of the address changes nothing", {
+  expect_identical(create_GymClient("http://127.0.0.1:5000/")$remote_base, "http://127.0.0.1:5000")
+})
+
+test_that("what is no address is refused and named", {
+  expect_error(create_GymClient("127.0.0.1:5000"), "127.0.0.1:5000", class = "gym_error_argument")
+  expect_error(create_GymClient(5000), "5000", class = "gym_error_argument")
+  expect_error(create_GymClient("http://a", timeout = 0), "timeout", class = "gym_error_argument")
+  expect_error(create_GymClient("http://a", config = list()), "config",
+               class = "gym_error_argument")
+})
+
+test_that("what is no client is refused", {
+  expect_error(env_list_all("http://127.0.0.1:5000"), "client", class = "gym_error_argument")
+})
+
+test_that("what cannot be a query or a body is refused by name before it is sent", {
+  client <- create_GymClient("http://127.0.0.1:1")
+  refused <- function(data, text, request = get_request) {
+    cnd <- expect_error(request(client, "/v1/registry/", data), class = "gym_error_argument")
+    expect_match(conditionMessage(cnd), text, fixed = TRUE)
+  }
+  refused(list(search = c("a", "b")), "`data$search` must be one value, not c(\"a\", \"b\")")
+  refused(list(search = NULL), "`data$search` must be one value, not NULL")
+  refused(list(search = NA), "`data$search` must be one value, not NA")
+  refused(list(search = list(1)), "`data$search` must be one value, not a list of length 1")
+  for (request in list(get_request, post_request)) {
+    refused(list("a"), "`data` must be a list with names", request)
+    refused(3, "`data` must be a list with names", request)
+    refused(list(a = 1, a = 2), "`data` has `a` more than once", request)
+  }
+})
+
+test_that("classic requests go to any route", {
+  client <- test_client()
+  expect_equal(get_request(client, "/v1/health/")$status, "ok")
+  id <- post_request(client, "/v1/envs/", list(env_id = "CartPole-v1"))$instance_id
+  expect_match(id, "^[0-9a-f]{8}$")
+  expect_null(post_request(client, paste0("/v1/envs/", id, "/close/")))
+})
+
+test_that("an answer of httr's is read or raised", {
+  skip_unless_all()
+  base <- local_server(token = FALSE)$remote_base
+  answer <- parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/health/")))
+  expect_equal(answer$status, "ok")
+  expect_error(
+    parse_server_error_or_raise_for_status(httr::GET(paste0(base, "/v1/envs/nobody/"))),
+    "Instance_id nobody unknown",
+    class = "gym_error_http_400"
+  )
+})
+
 test_that("environments in R, models and bandits are played where there is no Python", {
   skip_unless_all()
   script <- withr::local_tempfile(lines = c(
