@@ -18,17 +18,20 @@
 #'
 #' Ties are broken at random.
 #'
-#' # Contexts and logged data
+#' # Contexts
 #'
-#' `"linucb"` and `"thompson"` learn from logged steps, which have a context (the state), an action
-#' and a reward each: every action has a linear model of the context (with a ridge of 1). Data is
+#' `"linucb"` and `"thompson"` have a linear model of the context for every action (with a ridge of
+#' 1). They learn in an environment, whose observations are the contexts: a Box gives numbers, and
+#' each value of a Discrete or MultiDiscrete has a weight of its own. Or they learn from logged
+#' steps, which have a context (the state), an action and a reward each. Logged data is
 #' replayed (Li 2011): in each row the learner sees the context and chooses; only if it chooses the
 #' action of the data it sees the reward, and learns. If the data's actions were drawn with equal
 #' probabilities, the rewards that it saw are those that it would have got, on average. With the
 #' column `probability`, a row is used with a probability proportional to its inverse, which makes
 #' the rest as if all actions had been equally likely.
 #'
-#' @param env A bandit made by [bandit()]; or logged steps for a method with contexts, as for
+#' @param env A bandit made by [bandit()]. For a method with contexts an environment with countable
+#'   actions, its id or an object of [gym_make()] or [gym_env()]; or logged steps, as for
 #'   [learn_fitted_q()].
 #' @param method The method, a string.
 #' @param epsilon The probability of exploring, a number from 0 to 1. The default is 0.1.
@@ -43,7 +46,7 @@
 #'   reward so far, `FALSE` for 0.
 #' @param learners The number of learners, a whole number of at least 1. The default is 2,000.
 #' @param horizon The number of steps, a whole number. `NULL`, the default, plays one episode of the
-#'   bandit.
+#'   bandit, and 1,000 steps with contexts. From logged data it is not used.
 #' @param seed A whole number that fixes all random numbers, as for [rollout()].
 #' @return An object of class `gym_bandit_learning`, with methods for [print()], [as.data.frame()]
 #'   and [plot()][plot.gym_bandit_learning()]. It is a list with the elements `curve`, a data frame
@@ -52,7 +55,7 @@
 #'   row for each learner and a column for each arm, holding the final values or preferences; and
 #'   `label`, `learners` and `seed`.
 #'
-#'   From logged data it is one learner. `curve` then has a row for each step that it saw, with the
+#'   With contexts it is one learner. `curve` then has a row for each step that it saw, with the
 #'   mean of all rewards until then, and there are the further elements `reward` and `se` (the mean
 #'   of the rewards that it saw, and its standard error), `seen` and `rows` (their number, and that
 #'   of the data's rows), and `policy`, which takes the best action by the final models.
@@ -71,6 +74,19 @@
 #' explores
 #' plot(greedy, explores)
 #'
+#' # A shop that shows one of two pictures: older visitors prefer the second.
+#' shop <- gym_env(
+#'   reset = function(self) self$age <- runif(1),
+#'   step = function(self, action) {
+#'     clicks <- runif(1) < if (action == 1) self$age else 0.5
+#'     list(observation = self$age, reward = as.numeric(clicks), terminated = TRUE)
+#'   },
+#'   observation_space = space_box(0, 1), action_space = space_discrete(2), id = "Shop"
+#' )
+#' learned <- learn_bandit(shop, "linucb", horizon = 300, seed = 1)
+#' learned
+#' predict(learned$policy, c(0.1, 0.9))
+#'
 #' # Logged clicks, and what a learner would have made of them.
 #' set.seed(1)
 #' clicks <- data.frame(episode = 1:2000, age = runif(2000), action = sample(0:1, 2000, TRUE))
@@ -81,14 +97,23 @@ learn_bandit <- function(env,
                          epsilon = 0.1, confidence = NULL, learning_rate = NULL, initial = 0,
                          baseline = TRUE, learners = 2000, horizon = NULL, seed = NULL) {
   contextual <- c("linucb", "thompson")
+  problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
   if (method[1L] %in% contextual) {
     check_number(confidence, min = 0, allow_null = TRUE)
+    check_count(horizon, allow_null = TRUE)
     check_seed(seed)
-    return(replay_bandit(env, method[1L], confidence %||% 1, seed %||% draw_seed(),
-                         rlang::current_env()))
+    call <- rlang::current_env()
+    confidence <- confidence %||% 1
+    seed <- seed %||% draw_seed()
+    if (is.data.frame(env) || inherits(env, "gym_rollout")) {
+      return(replay_bandit(env, method[1L], confidence, seed, call))
+    }
+    if (rlang::is_string(env) || inherits(env, "gym_env") && is.null(problem)) {
+      return(live_bandit(env, method[1L], confidence, horizon %||% 1000L, seed, call))
+    }
+    abort_argument(env, "an environment with contexts, or logged steps", "env", call)
   }
   confidence <- confidence %||% 2
-  problem <- if (inherits(env, "gym_r_env")) bandit_of(env)
   if (is.null(problem)) {
     hint <- if (is.data.frame(env)) {
       "From logged data `method = \"linucb\"` and `\"thompson\"` learn."
@@ -191,9 +216,9 @@ bandit_text <- function(rule, initial) {
 print.gym_bandit_learning <- function(x, ...) {
   if (!is.null(x$policy)) {
     return(print_lines(x, c(
-      paste0("A learner in logged data: ", x$label),
-      paste0("It saw ", count_of(x$seen, "step"), " of ", whole_number_text(x$rows),
-             ": mean reward ", number_text(x$reward), se_text(x$se))
+      paste0("A learner in ", x$env_id, ": ", x$label),
+      paste0("It saw ", count_of(x$seen, "step"),
+             if (x$rows > x$seen) paste(" of", whole_number_text(x$rows)), ": mean reward ", number_text(x$reward), se_text(x$se))
     )))
   }
   last <- utils::tail(x$curve, 100L)

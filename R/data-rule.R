@@ -137,7 +137,7 @@ print.gym_policy_fitted <- function(x, ...) {
 rule_lines <- function(x) {
   regression <- x$regression
   labels <- row_texts(x$steps$actions)
-  simple <- length(labels) == 2L && length(x$steps$actions) == 1L && !x$recipe$double
+  simple <- length(labels) == 2L && length(x$steps$actions) == 1L && !isTRUE(x$recipe$double)
   if (!is.null(regression$coefficients) && simple) {
     return(unlist(lapply(seq_along(x$fits), function(step) {
       own <- regression$coefficients(x$fits[[step]])

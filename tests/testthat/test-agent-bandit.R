@@ -148,3 +148,39 @@ test_that("data without probabilities is replayed without a warning", {
   clicks <- data.frame(episode = 1:100, age = runif(100), action = 0:1, reward = 0:1)
   expect_warning(learn_bandit(clicks, "linucb", seed = 1), NA)
 })
+
+test_that("learners with contexts learn in an environment", {
+  matching <- gym_env(
+    reset = function(self) self$shown <- sample(0:2, 1),
+    step = function(self, action) {
+      pays <- (action[[1]] == self$shown) + action[[2]]
+      list(observation = self$shown, reward = pays, terminated = TRUE)
+    },
+    observation_space = space_discrete(3), action_space = space_multi_discrete(c(3, 2)),
+    id = "Matching"
+  )
+  for (method in c("linucb", "thompson")) {
+    learned <- learn_bandit(matching, method, horizon = 400, seed = 1)
+    expect_identical(learned, learn_bandit(matching, method, horizon = 400, seed = 1))
+    # Each value of the context has a weight, and each combination of parts is an action.
+    expect_identical(dim(learned$values), c(3L, 6L))
+    expect_identical(learned$curve$mean_reward[[400]], mean(learned$policy$steps$reward))
+    played <- rollout(matching, learned$policy, episodes = 20, seed = 2)
+    expect_identical(played$episodes$return, rep(2, 20))
+    expect_output(print(learned), "in Matching: .*\nIt saw 400 steps: mean reward")
+  }
+  # The models are ridge regressions of the steps that were played.
+  steps <- learned$policy$steps
+  x <- cbind(1, steps$state[[1]] == 1, steps$state[[1]] == 2)
+  for (action in seq_len(6)) {
+    own <- steps$action == action
+    by_hand <- solve(diag(3) + crossprod(x[own, , drop = FALSE]),
+                     crossprod(x[own, , drop = FALSE], steps$reward[own]))
+    expect_equal(unname(learned$values[, action]), by_hand[, 1], tolerance = 1e-8)
+  }
+  # An episode may have many steps; its observations are numbers.
+  balanced <- learn_bandit("CartPole-v1", "linucb", horizon = 40, seed = 1)
+  expect_gt(max(balanced$policy$steps$episode), 1L)
+  expect_output(print(balanced$policy), "LinUCB")
+  expect_error(learn_bandit("Pendulum-v1", "linucb"), "Box", class = "gym_error_argument")
+})
