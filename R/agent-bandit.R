@@ -218,7 +218,8 @@ print.gym_bandit_learning <- function(x, ...) {
     return(print_lines(x, c(
       paste0("A learner in ", x$env_id, ": ", x$label),
       paste0("It saw ", count_of(x$seen, "step"),
-             if (x$rows > x$seen) paste(" of", whole_number_text(x$rows)), ": mean reward ", number_text(x$reward), se_text(x$se))
+             if (x$rows > x$seen) paste(" of", whole_number_text(x$rows)),
+             ": mean reward ", number_text(x$reward), se_text(x$se))
     )))
   }
   last <- utils::tail(x$curve, 100L)
