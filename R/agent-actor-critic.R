@@ -50,7 +50,7 @@ agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate 
 agent_start.gym_agent_actor_critic <- function(agent, policy) {
   agent <- NextMethod()
   # The weights are the critic's; the actor's are the preferences.
-  columns <- as.integer(agent$spaces$action_space$n)
+  columns <- count_actions(agent)
   preferences <- if (!is.null(agent$weights)) matrix(0, nrow(agent$weights), columns)
   possible <- policy$possible
   if (is.null(agent$features) && !is.null(possible)) {
@@ -64,9 +64,7 @@ agent_start.gym_agent_actor_critic <- function(agent, policy) {
 learner_of.gym_agent_actor_critic <- function(agent, draw) {
   learning <- learning_of(agent, draw)
   critic <- learning$store
-  actor <- value_store(
-    agent$basis, agent$preferences, 0, as.integer(agent$spaces$action_space$n)
-  )
+  actor <- value_store(agent$basis, agent$preferences, 0, count_actions(agent))
   discount <- agent$discount
   rate <- rate_of(agent$learning_rate)
   actor_rate <- rate_of(agent$actor_rate, "actor_rate")
@@ -118,7 +116,7 @@ softmax <- function(preferences) {
 #' @export
 agent_policy.gym_agent_actor_critic <- function(agent) {
   agent$weights <- agent$preferences
-  policy <- weights_policy(agent, as.integer(agent$spaces$action_space$n))
+  policy <- weights_policy(agent, count_actions(agent))
   policy$temperature <- 1
   policy
 }

@@ -91,7 +91,7 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
 # A batch of all values of a space, NULL if it has too many for a table or they cannot be counted.
 all_choices <- function(space) {
   index <- space_index(space)
-  if (!is.null(index) && index$count <= most_prepared) values_batch(space, all_values(space))
+  if (!is.null(index) && index$count <= most_prepared) index$value(seq_len(index$count))
 }
 
 # Contexts as numbers: the columns of a linear model without interactions.

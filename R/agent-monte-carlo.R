@@ -227,7 +227,7 @@ agent_tell.gym_agent_monte_carlo <- function(agent, results) {
   n <- length(steps$reward)
   agent$taken <- agent$taken + n
   cell <- agent$basis$of(steps$observation, n)[, 1L] +
-    nrow(agent$weights) * (action_columns(agent$spaces, steps$action) - 1)
+    nrow(agent$weights) * (space_index(agent$spaces$action_space)$index(steps$action, n) - 1)
   returns <- sum_backwards(steps$reward, agent$discount, ends_of(steps$episode))
   if (agent$visits == "first") {
     counted <- !duplicated(cell + length(agent$weights) * (steps$episode - 1))

@@ -9,6 +9,10 @@
 #' remembered steps to learn from after each real one (Dyna-Q; section 8.2). The agent remembers the
 #' last outcome of each state and action.
 #'
+#' For actions of several parts (MultiDiscrete, MultiBinary, and Tuple or Dict of these) the table
+#' has a column for each combination, as in [policy_table()]. The actions that are played have their
+#' parts.
+#'
 #' During learning, the agent draws among actions with equal values. The policy that it returns
 #' takes the first of them. If the model is known, the agent never takes an action that a state does
 #' not have.
@@ -39,9 +43,9 @@
 #'   actions that were never taken in a visited state, as if they led back to it with no reward. The
 #'   default is 0, for none.
 #' @param mask The name of the element of the environment's info that marks the valid actions, such
-#'   as `"action_mask"` of Taxi: a number for each action, 0 for an invalid one. The agent never
-#'   takes an action again at an observation where it was marked invalid, and its value is `-Inf`.
-#'   For tables only. `NULL`, the default, for none.
+#'   as `"action_mask"` of Taxi: a number for each action (for each combination of its parts), 0 for
+#'   an invalid one. The agent never takes an action again at an observation where it was marked
+#'   invalid, and its value is `-Inf`. For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
 #'   For `learn_q()` also logged steps, as for [learn_fitted_q()]: it then sweeps over all pairs of
@@ -54,8 +58,8 @@
 #'   it and returns the result of [train_agent()]. Its `$policy` takes the action with the largest
 #'   value, and [state_values()] returns the values. From data it returns a policy, as
 #'   [learn_fitted_q()] does.
-#' @section Errors: `gym_error_argument` for an invalid argument, actions that are not Discrete, or
-#'   observations that do not fit a table.
+#' @section Errors: `gym_error_argument` for an invalid argument, or actions or observations that do
+#'   not fit a table.
 #' @references C. Watkins (1989), Learning from Delayed Rewards, PhD thesis, Cambridge. H. van
 #'   Hasselt (2010), Double Q-learning, NeurIPS 23. R. S. Sutton and A. G. Barto (2018),
 #'   Reinforcement Learning: An Introduction, second edition, MIT Press.

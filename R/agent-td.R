@@ -123,10 +123,14 @@ importance_ratio <- function(agent) {
 #' policy is asked; with several sub-environments it was asked about all of them together.
 #' @noRd
 policy_chooser <- function(agent, probabilities, draw) {
-  first <- agent$spaces$action_space$start - 1L
+  space <- agent$spaces$action_space
+  index <- space_index(space)$index
   function(x, sub_env, observation) {
     if (is.null(probabilities)) {
-      act_batch(agent$plays, observation, 1L, agent$spaces) - first
+      action <- act_batch(agent$plays, observation, 1L, agent$spaces)
+      column <- index(action, 1L)
+      if (is.na(column)) check_value(space, batch_value(space, action, 1L), "", NULL, TRUE)
+      column
     } else {
       draw_place(if (is.matrix(probabilities)) probabilities[x, ] else probabilities, draw())
     }
@@ -140,7 +144,9 @@ chooser_probabilities <- function(policy, action_space, by_state) {
     table_probabilities(policy)
   } else if (inherits(policy, "gym_policy_random")) {
     if (is.null(policy$possible)) {
-      (state_numbers(action_space) %in% state_numbers(policy$action_space)) + 0
+      index <- space_index(action_space)
+      actions <- index$value(seq_len(index$count))
+      as.double(!is.na(space_index(policy$action_space)$index(actions, index$count)))
     } else if (by_state) {
       policy$possible + 0
     }

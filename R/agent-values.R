@@ -46,15 +46,7 @@ check_learner <- function(settings, call = rlang::caller_env()) {
 
 #' @export
 agent_start.gym_value_learner <- function(agent, policy) {
-  abort_if(
-    !inherits(policy$action_space, "gym_space_discrete"), "env", NULL, NULL,
-    "A learner of values needs Discrete actions, not {format(policy$action_space)}.",
-    i = if (is.null(space_index(policy$action_space))) {
-      "`search_ars()` and `search_cem()` learn actions of a Box."
-    } else {
-      "`learn_q()` learns such actions from data: a `rollout()` with `steps = TRUE`."
-    }
-  )
+  table_index(policy$action_space, "actions", NULL)
   agent$spaces <- policy[c("observation_space", "action_space")]
   agent$basis <- basis_of(agent$features, policy$observation_space, NULL)
   agent$taken <- 0
@@ -65,8 +57,10 @@ agent_start.gym_value_learner <- function(agent, policy) {
 # The number of columns of the weights: one for each action, or one for the values of states.
 value_columns_of <- function(agent) {
   of_states <- inherits(agent, c("gym_agent_td", "gym_agent_actor_critic"))
-  if (of_states) 1L else as.integer(agent$spaces$action_space$n)
+  if (of_states) 1L else count_actions(agent)
 }
+
+count_actions <- function(agent) as.integer(space_index(agent$spaces$action_space)$count)
 
 first_weights <- function(agent, policy) {
   if (!is.null(policy$q)) {
@@ -297,7 +291,8 @@ weights_policy <- function(agent, columns) {
 #'   observations with several parts, such as Blackjack's, a data frame with a column for each part,
 #'   under its name, and `value`. A rule from data has a data frame of the states of the data, with
 #'   the column `step` if it has a horizon. With `actions = TRUE` a data frame with a row for each
-#'   state and action: the column `state`, or one for each part, `action` (its number) and `value`.
+#'   state and action: the column `state`, or one for each part, `action` (its number), or one for
+#'   each part, such as `action_dose`, and `value`.
 #'   States that were never left, such as terminal ones, keep their first value.
 #' @section Errors: `gym_error_argument` if `x` was not learned by a table or by features of
 #'   Discrete observations.
@@ -329,7 +324,7 @@ state_values <- function(x, actions = FALSE) {
   if (actions) {
     states <- all_values(space)
     row <- rep(seq_len(nrow(q)), each = ncol(q))
-    actions <- agent$spaces$action_space
+    actions <- countable_actions(agent$spaces$action_space)
     numbers <- rep(state_numbers(actions)[seq_len(ncol(q))], nrow(q))
     return(data.frame(
       states[row, , drop = FALSE], decoded_actions(actions, numbers), value = as.vector(t(q)),

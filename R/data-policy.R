@@ -101,12 +101,16 @@ known_policy_says <- function(policy, states, call) {
   if (inherits(policy$observation_space, "gym_space_discrete")) {
     observed <- encoded_values(policy$observation_space, observed, "state", call)
   }
+  own <- policy$action_space
+  counted <- countable_actions(own)
   said <- tryCatch(
     predict_policy(policy, observed, "probability", call), gym_error_argument = function(cnd) {
-      predict_policy(policy, observed, "action", call)
+      action <- predict_policy(policy, observed, "action", call)
+      of_parts <- !is.null(counted) && !inherits(own, "gym_space_discrete")
+      if (of_parts) space_index(own)$index(action, nrow(states)) - 1L else action
     }
   )
-  space <- policy$action_space %||% space_discrete(max(NCOL(said), 1L))
+  space <- counted %||% space_discrete(max(NCOL(said), 1L))
   if (is.matrix(said)) colnames(said) <- value_labels(space) else said <- named_numbers(space, said)
   said
 }

@@ -71,7 +71,7 @@ new_state_map <- function(place, env, client, call) {
 #' @noRd
 new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   space <- place$observation_space
-  table_index(space, "observations", call)
+  index <- table_index(space, "observations", call)
   grid <- all_values(space)
   observed <- list(names = names(grid))
   axes <- if (is.null(x) && is.null(y)) 1:2 else mapped_axes(observed, x, y, call)
@@ -91,11 +91,10 @@ new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
   grid <- grid[shown, , drop = FALSE]
   row.names(grid) <- NULL
   place$call <- call
-  parts <- grid
-  rows <- space_index(space)$index(values_batch(space, parts), nrow(parts))
+  rows <- which(shown)
   grid$action <- actions_where(
     has_action(place$policy, rows), place$policy,
-    function(rows) named_batch(space, values_batch(space, parts[rows, , drop = FALSE])), place
+    function(some) named_batch(space, index$value(rows[some])), place
   )
   if (inherits(place$policy, "gym_policy_table")) grid$value <- row_max(place$policy$q)[rows]
   structure(class = c("gym_state_map", "gym_decision_map"), list(

@@ -6,8 +6,8 @@
 #' @param policy A policy that is bound to the environment, or several candidates.
 #' @param env The environment, for its action space.
 #' @return A list: `document`, a list for JSON, and `tensors`, a named list of numeric vectors and
-#'   arrays. `NULL` for a policy that is not data: a function, a model, one with a memory, or a
-#'   user's class.
+#'   arrays. `NULL` for a policy that is not data: a function, a model, one with a memory, a user's
+#'   class, or a table for actions of several parts.
 #' @noRd
 policy_data <- function(policy, env) {
   # By the first class alone: a subclass may have its own method to act.
@@ -18,10 +18,12 @@ policy_data <- function(policy, env) {
       network_data(policy$policy, policy$weights)
     },
     gym_policy_random = random_data(policy, env),
-    gym_policy_table = list(
-      document = list(kind = "table", epsilon = policy$epsilon, temperature = policy$temperature),
-      tensors = list(q = policy$q)
-    ),
+    gym_policy_table = if (inherits(env$action_space, "gym_space_discrete")) {
+      list(
+        document = list(kind = "table", epsilon = policy$epsilon, temperature = policy$temperature),
+        tensors = list(q = policy$q)
+      )
+    },
     gym_policy_list = list_data(policy, env)
   )
 }

@@ -198,13 +198,12 @@ new_feature_policy <- function(basis, weights, env) {
 #' @exportS3Method
 act_batch.gym_policy_features <- function(policy, observation, n, vector_env) {
   values <- feature_values(policy, observation, n)
-  as.integer(draw_table_actions(policy, values) - 1L + policy$action_space$start)
+  space_index(policy$action_space)$value(draw_table_actions(policy, values))
 }
 
 #' @export
 act.gym_policy_features <- function(policy, observation, ...) {
-  observed <- observed_batch(observation, policy$observation_space)
-  act_batch(policy, observed$batch, observed$n, NULL)
+  observed_actions(policy, observed_batch(observation, policy$observation_space))
 }
 
 #' @exportS3Method
@@ -212,7 +211,7 @@ predict_policy.gym_policy_features <- function(policy, newdata, type, call = rla
   if (type == "probability") abort_no_probabilities(policy, call)
   observed <- observed_batch(newdata, policy$observation_space, "newdata", call)
   if (type == "action") {
-    return(act_batch(policy, observed$batch, observed$n, NULL))
+    return(observed_actions(policy, observed))
   }
   feature_values(policy, observed$batch, observed$n)
 }

@@ -8,6 +8,8 @@
 #'
 #' Observations are Discrete, MultiDiscrete, MultiBinary, or a Tuple or Dict of these. The rows are
 #' in the order of a Discrete space's numbers. With several numbers the last one changes first.
+#' Actions are of these kinds, too: a table has a column for each combination of an action's parts,
+#' in the same order, and the actions that the policy takes have their parts.
 #'
 #' @param q A numeric matrix with a row for each state and a column for each action: values, or
 #'   other numbers of which larger is better. `-Inf` marks an invalid action. A row without a valid
@@ -63,10 +65,15 @@ check_in_order <- function(q, call = rlang::caller_env()) {
 act.gym_policy_table <- function(policy, observation, ...) {
   by_name <- !is.null(states_of(policy)$values) && !is.numeric(observation)
   if (by_name) observation <- encoded_values(states_of(policy), observation, "state", NULL)
-  observed <- observed_batch(observation, states_of(policy))
-  actions <- act_batch(policy, observed$batch, observed$n, NULL)
+  actions <- observed_actions(policy, observed_batch(observation, states_of(policy)))
   # An observation given by name gets the name of its action.
   if (by_name) named_numbers(policy$action_space, actions) else actions
+}
+
+# An action for an observation, or a batch of actions for a batch.
+observed_actions <- function(policy, observed) {
+  actions <- act_batch(policy, observed$batch, observed$n, NULL)
+  if (observed$one) batch_value(policy$action_space, actions, 1L) else actions
 }
 
 #' @exportS3Method
@@ -89,8 +96,8 @@ states_of <- function(policy) policy$observation_space %||% space_discrete(nrow(
 #' @exportS3Method
 act_batch.gym_policy_table <- function(policy, observation, n, vector_env) {
   rows <- table_rows(policy, observation, n, vector_env$call)
-  start <- policy$action_space$start %||% 0L
-  as.integer(draw_table_actions(policy, rows) - 1L + start)
+  actions <- policy$action_space %||% space_discrete(ncol(rows))
+  space_index(actions)$value(draw_table_actions(policy, rows))
 }
 
 # The rows of the table for some observations.
@@ -146,11 +153,7 @@ row_probabilities <- function(policy, rows) {
 policy_bind.gym_policy_table <- function(policy, env, call = rlang::caller_env()) {
   env <- one_sub_env(env)
   states <- table_index(env$observation_space, "observations", call)$count
-  abort_if(
-    !inherits(env$action_space, "gym_space_discrete"), "policy", policy, call,
-    "A table cannot have a column for each action of {format(env$action_space)}."
-  )
-  actions <- as.double(env$action_space$n)
+  actions <- table_index(env$action_space, "actions", call)$count
   abort_if(
     nrow(policy$q) != states || ncol(policy$q) != actions, "policy", policy, call,
     "The policy's table has {count_of(nrow(policy$q), 'row')} and

@@ -46,7 +46,8 @@
 #' @param ... For methods.
 #' @return For one observation one action: a whole number for a discrete action space, a numeric
 #'   vector (or array) in the shape of the space for a Box. For `n` observations an integer vector
-#'   of length `n`, or a matrix with `n` rows (an array with `n` as its first dimension).
+#'   of length `n`, or a matrix with `n` rows (an array with `n` as its first dimension). For a
+#'   Tuple or Dict a list of these for the parts.
 #'   `predict()` returns the same; with `type = "output"` a numeric vector of length `n` (a matrix
 #'   with `n` rows if the network has several outputs), and with `type = "probability"` a matrix
 #'   with a row for each observation and a column for each action.

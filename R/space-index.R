@@ -3,9 +3,9 @@
 
 #' Number the values of a space
 #'
-#' @return A list: `count`, a number, and `index`, a function of a batch of values and their number
-#'   that returns their numbers, from 1, and `NA` for a value outside the space. `NULL` if the
-#'   values cannot be counted.
+#' @return A list: `count`, a number; `index`, a function of a batch of values and their number that
+#'   returns their numbers, from 1, and `NA` for a value outside the space; and `value`, a function
+#'   of such numbers that returns a batch of the values. `NULL` if the values cannot be counted.
 #' @noRd
 space_index <- function(space) UseMethod("space_index")
 
@@ -16,7 +16,11 @@ space_index.default <- function(space) NULL
 space_index.gym_space_discrete <- function(space) {
   start <- space$start
   count <- as.double(space$n)
-  list(count = count, index = function(batch, n) as.integer(beyond_start(batch, start, count)) + 1L)
+  list(
+    count = count,
+    index = function(batch, n) as.integer(beyond_start(batch, start, count)) + 1L,
+    value = function(number) as.integer(number - 1L + start)
+  )
 }
 
 # The distance of whole numbers from the first of `n`; NA for others.
@@ -28,16 +32,17 @@ beyond_start <- function(x, start, n) {
 
 #' @exportS3Method
 space_index.gym_space_multidiscrete <- function(space) {
-  digits_index(as.double(space$nvec), as.double(space$start %||% 0), length(space$shape))
+  digits_index(as.double(space$nvec), as.double(space$start %||% 0), space$shape)
 }
 
 #' @exportS3Method
 space_index.gym_space_multibinary <- function(space) {
-  digits_index(rep(2, prod(space$shape)), 0, length(space$shape))
+  digits_index(rep(2, prod(space$shape)), 0, space$shape)
 }
 
 # Numbers of several digits, of which the last one changes first, as in Gymnasium's own arrays.
-digits_index <- function(nvec, start, rank) {
+digits_index <- function(nvec, start, shape) {
+  rank <- length(shape)
   weights <- rev(cumprod(c(1, rev(nvec))))[-1L]
   list(
     count = prod(nvec),
@@ -50,6 +55,11 @@ digits_index <- function(nvec, start, rank) {
       first <- rep(start, each = if (length(start) > 1L) n else 1L)
       digits <- beyond_start(as.vector(batch), first, rep(nvec, each = n))
       as.integer(matrix(digits, n) %*% weights + 1)
+    },
+    value = function(number) {
+      # A column for each value.
+      digits <- outer(weights, number - 1, function(weight, beyond) beyond %/% weight) %% nvec
+      shape_values(as.integer(digits + start), c(length(number), shape))
     }
   )
 }
@@ -70,6 +80,12 @@ space_index.gym_space_tuple <- function(space) {
       }
       each <- Map(function(part, values) part$index(values, n) - 1, parts, batch)
       as.integer(Reduce(`+`, Map(`*`, each, weights)) + 1)
+    },
+    value = function(number) {
+      each <- Map(function(part, count, weight) {
+        part$value((number - 1) %/% weight %% count + 1)
+      }, parts, counts, weights)
+      stats::setNames(each, names(space$spaces))
     }
   )
 }
@@ -132,49 +148,41 @@ digit_values <- function(space) {
 # The Discrete space of the numbers of actions of several parts, which have the columns of the table
 # of steps as names; NULL if they cannot be counted.
 countable_actions <- function(space) {
-  if (is.null(space) || is.null(space_index(space))) {
+  index <- if (!is.null(space)) space_index(space)
+  if (is.null(index)) {
     return(NULL)
   }
   if (inherits(space, "gym_space_discrete")) {
     return(space)
   }
   values <- all_values(space)
-  names(values) <- names(value_columns(space, values_batch(space, values), "action"))
+  names(values) <- names(value_columns(space, index$value(seq_len(index$count)), "action"))
   labelled_space(values)
 }
 
-#' Make a batch of values of a space from the table of their numbers
-#' @param columns A data frame as returned by [all_values()].
-#' @noRd
-values_batch <- function(space, columns) {
-  if (inherits(space, "gym_space_discrete")) {
-    return(columns[[1L]])
-  }
-  if (!has_parts(space)) {
-    return(unname(as.matrix(columns)))
-  }
-  sizes <- vapply(space$spaces, function(part) length(digit_values(part)), 0L)
-  part <- rep(seq_along(sizes), sizes)
-  batches <- lapply(seq_along(sizes), function(i) {
-    values_batch(space$spaces[[i]], columns[part == i])
-  })
-  stats::setNames(batches, space$names %||% names(space$spaces))
-}
-
-# The index of a space for the rows of a table.
+# The index of a space for the rows of a table (`what` is "observations"), or for its columns
+# ("actions").
 table_index <- function(space, what, call) {
   index <- space_index(space)
+  observed <- what == "observations"
   if (is.null(index)) {
     abort_wrong(NULL, space, call,
                 "A table needs {what} that can be counted, but {format(space)} cannot.",
                 i = "Discrete, MultiDiscrete and MultiBinary can, and a Tuple or Dict of these.",
-                i = "For observations in a Box use a network or features.")
+                i = if (observed) {
+                  "For observations in a Box use a network or features."
+                } else {
+                  "`search_ars()` and `search_cem()` learn actions of a Box."
+                })
   }
   if (index$count > most_values) {
     abort_wrong(NULL, space, call,
-                "A table for {format(space)} would have {whole_number_text(index$count)} rows; at
-                 most {whole_number_text(most_values)} are possible.",
-                i = "With `features`, such as `tile_coding()`, observations share a value.")
+                "A table for {format(space)} would have {whole_number_text(index$count)}
+                 {if (observed) \"rows\" else \"columns\"}; at most
+                 {whole_number_text(most_values)} are possible.",
+                i = if (observed) {
+                  "With `features`, such as `tile_coding()`, observations share a value."
+                })
   }
   index
 }

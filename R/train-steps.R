@@ -75,9 +75,12 @@ world_of <- function(vector_env, basis, draw) {
 
 # Any environment with functions for reset and step.
 stepped_world <- function(vector_env, basis) {
-  first <- as.integer(vector_env$action_space$start) - 1L
+  space <- vector_env$action_space
+  action_of <- space_index(space)$value
   reset <- vector_env$reset
-  step <- vector_env$step_one %||% function(action) vector_env$step(action, 1L)
+  # A single number is also a batch of one.
+  step_one <- if (inherits(space, "gym_space_discrete")) vector_env$step_one
+  step <- step_one %||% function(action) vector_env$step(action, 1L)
   one <- basis$one
   list(
     guard = vector_env$guard,
@@ -86,7 +89,7 @@ stepped_world <- function(vector_env, basis) {
       list(one(observation), observation)
     },
     step = function(x, column) {
-      out <- step(column + first)
+      out <- step(action_of(column))
       observation <- out$next_observation
       list(one(observation), out$reward, out$terminated, out$truncated, observation)
     }
@@ -144,7 +147,7 @@ model_world <- function(model, basis, draw) {
 side_by_side <- function(learner, agent, call) {
   basis <- agent$basis
   space <- agent$spaces$observation_space
-  first <- as.integer(agent$spaces$action_space$start) - 1L
+  action_of <- space_index(agent$spaces$action_space)$value
   pick <- if (identical(basis$each, 1L)) .subset2 else function(present, i) present[i, ]
   see <- function(observation, i) if (learner$sees) batch_rows(space, observation, i)
   observe <- learner$observe
@@ -157,7 +160,7 @@ side_by_side <- function(learner, agent, call) {
       for (i in which(is.na(column))) {
         column[[i]] <<- learner$act(pick(present, i), sub_env[[i]], see(observation, i))
       }
-      column + first
+      action_of(column)
     },
     observe = function(transitions) {
       reward <- transitions$reward
@@ -266,7 +269,7 @@ mask_in <- function(info, name, n, actions, call) {
   if (is.null(mask)) {
     return(NULL)
   }
-  count <- as.integer(actions$n)
+  count <- as.integer(space_index(actions)$count)
   right <- (is.numeric(mask) || is.logical(mask)) && length(mask) == n * count &&
     (n == 1L || identical(dim(mask), c(n, count)))
   abort_if(
@@ -275,6 +278,7 @@ mask_in <- function(info, name, n, actions, call) {
      {count_of(count, \"action\")}{if (n > 1L) paste(\" and of\", n, \"sub-environments\")}, not
      {describe_argument(mask)}."
   )
+  if (n == 1L) mask <- row_major(mask)
   matrix(mask != 0, n, count)
 }
 

@@ -11,3 +11,20 @@ small_model <- function() {
 behaves <- rbind(c(0.5, 0.5), c(0.4, 0.6), c(0.6, 0.4), c(0.5, 0.5))
 wanted <- rbind(c(0.3, 0.7), c(0.6, 0.4), c(0.4, 0.6), c(1, 0))
 by_table <- function(p) function(states) p[states[[1L]] + 1, ]
+
+# Actions of several parts: what pays is the state, and twice the state.
+spaces_of_parts <- list(
+  space_multi_discrete(2:3), space_tuple(space_discrete(2), space_discrete(3)),
+  space_dict(left = space_discrete(2), right = space_discrete(3))
+)
+env_of_parts <- function(action_space) {
+  gym_env(
+    reset = function(self) self$state <- sample(0:1, 1),
+    step = function(self, action) {
+      reward <- (action[[1]] == self$state) + (action[[2]] == 2 * self$state)
+      self$state <- sample(0:1, 1)
+      list(observation = self$state, reward = reward, terminated = FALSE)
+    },
+    observation_space = space_discrete(2), action_space = action_space, max_episode_steps = 4
+  )
+}

@@ -189,6 +189,25 @@ def shifted():
     return Odd(spaces.Discrete(3, start=-1), spaces.Discrete(3, start=5))
 
 
+class Parts(gym.Env):
+    """Pays for the number of the state, and for twice this number."""
+
+    observation_space = spaces.Discrete(2)
+    action_space = spaces.Dict({"left": spaces.Discrete(2), "right": spaces.Discrete(3)})
+
+    def _observe(self):
+        self.state = self.np_random.integers(2)
+        return self.state
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._observe(), {}
+
+    def step(self, action):
+        reward = float(action["left"] == self.state) + float(action["right"] == 2 * self.state)
+        return self._observe(), reward, False, False, {}
+
+
 class Riddle(spaces.Space):
     """An unknown kind of space."""
 
@@ -250,6 +269,7 @@ for maker in (
     name = "".join(word.title() for word in maker.__name__.split("_"))
     gym.register(f"{name}-v0", entry_point=maker, disable_env_checker=True)
 
+gym.register("Parts-v0", entry_point=Parts, max_episode_steps=4, disable_env_checker=True)
 gym.register("OutOfMemory-v0", entry_point=OutOfMemory, disable_env_checker=True)
 
 for channels in (1, 3, 4):
