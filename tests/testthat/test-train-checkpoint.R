@@ -278,25 +278,31 @@ test_that("a server that plays other episodes than the one before is an error", 
 test_that("kill -9 of the server: the same call goes on to the result of an undisturbed search", {
   skip_unless_all()
   path <- local_checkpoint()
-  play <- function(server, ...) {
+  # Kills its server when it takes step `last`.
+  play <- function(server, last = Inf, ...) {
     env <- gym_make("CartPole-v1", num_envs = 32, client = server)
+    process <- the_session$servers[[server$remote_base]]$process
+    steps <<- 0
+    step <- env$step
+    unlockBinding("step", env)
+    env$step <- function(...) {
+      steps <<- steps + 1
+      if (steps == last) process$kill()
+      step(...)
+    }
     quiet_search(env, rounds = 40, target = Inf, seed = 1, ...)
   }
   server <- local_server()
   undisturbed <- play(server)
-  killed <- 0L
-  repeat {
-    process <- the_session$servers[[server$remote_base]]$process
-    if (killed < 2L) {
-      moment <- undisturbed$elapsed * if (killed) 0.3 else 0.6
-      kill_later(process$get_pid(), moment)
-    }
-    search <- tryCatch(play(server, checkpoint = path), gym_error_connection = identity)
-    if (inherits(search, "gym_search")) break
-    killed <- killed + 1L
+  all <- steps
+  for (share in c(0.6, 0.3)) {
+    expect_error(play(server, round(share * all), checkpoint = path),
+                 class = "gym_error_connection")
+    expect_true(file.exists(path))
     server <- local_server()
   }
-  expect_gt(killed, 0)
+  search <- play(server, checkpoint = path)
+  expect_lt(steps, 0.5 * all)
   expect_identical(figures(search), figures(undisturbed))
 })
 
