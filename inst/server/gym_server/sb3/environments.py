@@ -22,8 +22,8 @@ from gym_server.errors import GymServerError
 from gym_server.sb3.failures import JobError
 from gym_server.vector_envs.sub_env import ThisThread
 
-# PyTorch's optimizers import triton, if it is installed. Its copy of LLVM crashes if Mesa's, which
-# draws MuJoCo without a display, was loaded before (findings/mujoco-mesa-triton.sh).
+# PyTorch's optimizers import triton, if it is installed. It has a copy of LLVM, and so has Mesa,
+# which draws MuJoCo without a display: the two get along only in this order.
 with contextlib.suppress(ImportError):
     importlib.import_module("triton")
 
