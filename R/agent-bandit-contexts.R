@@ -79,7 +79,7 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
                   horizon, method == "thompson", confidence)
   )
   steps <- list(
-    episode = played$episode, labels = unique(played$episode), step = seq_len(horizon),
+    episode = played$episode, labels = unique(played$episode), step = seq_along(played$action),
     state = contexts(bind_batches(observed, played$observation)), action = played$action,
     actions = data.frame(value_columns(world$action_space, actions, "action"), check.names = FALSE),
     reward = played$reward
@@ -165,21 +165,31 @@ play_contexts <- function(world, observation, actions, block, horizon, draws, co
   action <- episode <- integer(horizon)
   observations <- vector("list", horizon)
   playing <- 1L
-  for (step in seq_len(horizon)) {
-    now <- block(observation)[1L, ]
-    chosen <- learner$choose(now, stats::runif(1L))
-    out <- world$step_one(batch_value(world$action_space, actions, chosen))
-    learner$learn(now, chosen, out$reward)
-    observations[[step]] <- observation
-    action[[step]] <- chosen
-    reward[[step]] <- out$reward
-    episode[[step]] <- playing
-    ended <- out$terminated || out$truncated
-    observation <- if (ended) world$reset(NULL) else out$next_observation
-    playing <- playing + ended
-  }
+  finished <- 0L
+  until_interrupted(
+    for (step in seq_len(horizon)) {
+      now <- block(observation)[1L, ]
+      chosen <- learner$choose(now, stats::runif(1L))
+      out <- world$step_one(batch_value(world$action_space, actions, chosen))
+      suspendInterrupts({
+        learner$learn(now, chosen, out$reward)
+        observations[[step]] <- observation
+        action[[step]] <- chosen
+        reward[[step]] <- out$reward
+        episode[[step]] <- playing
+        finished <- step
+      })
+      ended <- out$terminated || out$truncated
+      observation <- if (ended) world$reset(NULL) else out$next_observation
+      playing <- playing + ended
+    },
+    "Interrupted: returning what was learned in {finished} of {total} steps.",
+    function() finished, total = horizon
+  )
+  if (!finished) rlang::interrupt()
+  played <- seq_len(finished)
   list(
-    observation = observations, action = action, reward = reward, episode = episode,
-    weights = learner$weights(colnames(x))
+    observation = observations[played], action = action[played], reward = reward[played],
+    episode = episode[played], weights = learner$weights(colnames(x))
   )
 }

@@ -46,7 +46,8 @@
 #'   reward so far, `FALSE` for 0.
 #' @param learners The number of learners, a whole number of at least 1. The default is 2,000.
 #' @param horizon The number of steps, a whole number. `NULL`, the default, plays one episode of the
-#'   bandit, and 1,000 steps with contexts. From logged data it is not used.
+#'   bandit, and 1,000 steps with contexts. An interrupt of these returns what was learned until
+#'   then. From logged data it is not used.
 #' @param seed A whole number that fixes all random numbers, as for [rollout()].
 #' @return An object of class `gym_bandit_learning`, with methods for [print()], [as.data.frame()]
 #'   and [plot()][plot.gym_bandit_learning()]. It is a list with the elements `curve`, a data frame

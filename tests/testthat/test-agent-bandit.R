@@ -184,3 +184,22 @@ test_that("learners with contexts learn in an environment", {
   expect_output(print(balanced$policy), "LinUCB")
   expect_error(learn_bandit("Pendulum-v1", "linucb"), "Box", class = "gym_error_argument")
 })
+
+test_that("an interrupt of a learner in an environment keeps what it learned", {
+  interrupting <- gym_env(
+    reset = function(self) runif(1),
+    step = function(self, action) {
+      self$steps <- self$steps + 1
+      if (self$steps == 11) rlang::interrupt()
+      list(observation = 0, reward = 1, terminated = TRUE)
+    },
+    observation_space = space_box(0, 1), action_space = space_discrete(2), steps = 0
+  )
+  expect_message(
+    learned <- learn_bandit(interrupting, "linucb", horizon = 30, seed = 1),
+    "in 10 of 30 steps", class = "gym_message_interrupted"
+  )
+  expect_identical(c(learned$seen, learned$rows, nrow(learned$curve)), c(10L, 10L, 10L))
+  whole <- learn_bandit(interrupting, "linucb", horizon = 10, seed = 1)
+  expect_identical(learned$values, whole$values)
+})
