@@ -4,6 +4,7 @@
 # learner saw, and `weights`, a matrix with a column for each action.
 learned_with_contexts <- function(played, context, steps, method, confidence, seed, env_id) {
   seen <- length(played$reward)
+  colnames(played$weights) <- row_texts(steps$actions)
   # The policy cannot be learned again in folds: that would be another play.
   context$label <- paste0(if (method == "linucb") "LinUCB" else "linear Thompson sampling",
                           ", confidence ", number_text(confidence))
@@ -57,17 +58,15 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
     i = "Make it without `num_envs`."
   )
   world <- single_env(env)
-  actions <- all_choices(world$action_space)
-  if (is.null(actions)) {
-    abort_wrong("env", env, call, "The actions must be countable, and those of
-                {environment_label(env)} are {format(world$action_space)}.")
-  }
+  actions <- table_index(world$action_space, "actions", call)
   observed <- world$observation_space
-  values <- all_choices(observed)
+  # Numbers that only tell values apart become factors, if there are not too many.
+  index <- space_index(observed)
+  levels <- if (!is.null(index) && index$count <= 1000) {
+    lapply(observation_columns(observed, index$value(seq_len(index$count))), unique)
+  }
   contexts <- function(observation) {
     columns <- data.frame(observation_columns(observed, observation), check.names = FALSE)
-    # Numbers that only tell values apart.
-    levels <- lapply(if (!is.null(values)) observation_columns(observed, values), unique)
     for (i in which(lengths(levels) > 1L)) columns[[i]] <- factor(columns[[i]], levels[[i]])
     columns
   }
@@ -81,17 +80,10 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
   steps <- list(
     episode = played$episode, labels = unique(played$episode), step = seq_along(played$action),
     state = contexts(bind_batches(observed, played$observation)), action = played$action,
-    actions = data.frame(value_columns(world$action_space, actions, "action"), check.names = FALSE),
+    actions = decoded_actions(world$action_space, actions$value(seq_len(actions$count))),
     reward = played$reward
   )
-  colnames(played$weights) <- row_texts(steps$actions)
   learned_with_contexts(played, context, steps, method, confidence, seed, env$spec$id)
-}
-
-# A batch of all values of a space, NULL if it has too many for a table or they cannot be counted.
-all_choices <- function(space) {
-  index <- space_index(space)
-  if (!is.null(index) && index$count <= most_prepared) index$value(seq_len(index$count))
 }
 
 # Contexts as numbers: the columns of a linear model without interactions.
@@ -152,15 +144,12 @@ replay_steps <- function(x, steps, used, draws, confidence) {
       learner$learn(now, chosen, steps$reward[[row]])
     }
   }
-  weights <- learner$weights(colnames(x))
-  colnames(weights) <- row_texts(steps$actions)
-  list(reward = steps$reward[seen], weights = weights)
+  list(reward = steps$reward[seen], weights = learner$weights(colnames(x)))
 }
 
 play_contexts <- function(world, observation, actions, block, horizon, draws, confidence) {
   x <- block(observation)
-  many <- as.integer(space_index(world$action_space)$count)
-  learner <- context_learner(ncol(x), many, draws, confidence)
+  learner <- context_learner(ncol(x), actions$count, draws, confidence)
   reward <- numeric(horizon)
   action <- episode <- integer(horizon)
   observations <- vector("list", horizon)
@@ -170,7 +159,7 @@ play_contexts <- function(world, observation, actions, block, horizon, draws, co
     for (step in seq_len(horizon)) {
       now <- block(observation)[1L, ]
       chosen <- learner$choose(now, stats::runif(1L))
-      out <- world$step_one(batch_value(world$action_space, actions, chosen))
+      out <- world$step_one(batch_value(world$action_space, actions$value(chosen), 1L))
       suspendInterrupts({
         learner$learn(now, chosen, out$reward)
         observations[[step]] <- observation

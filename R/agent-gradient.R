@@ -207,9 +207,6 @@ next_values <- function(value, last_value, terminated, last) {
   after
 }
 
-#' Estimate advantages (generalized advantage estimation, Schulman et al. 2016)
-#' @param after As next_values() returns it.
-#' @noRd
 # Divides rewards by the standard deviation of the discounted return so far and clips them at 10.
 # Returns a list: `reward`, and the `moments` of that return.
 scale_rewards <- function(reward, last, gamma, moments) {

@@ -140,7 +140,8 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
   value <- expected_values(agent$value, rows$inputs)
   last_value <- expected_values(agent$value, rows$last_inputs)
   after <- next_values(value, last_value, rows$terminated, rows$last)
-  # The temporal-difference errors of an episode, summed up from its end.
+  # Generalized advantage estimation (Schulman et al. 2016): the temporal-difference errors of an
+  # episode, summed up from its end.
   errors <- reward + agent$gamma * after - value
   rows$advantage <- sum_backwards(errors, agent$gamma * agent$lambda, rows$last)
   rows$return <- rows$advantage + value

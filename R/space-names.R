@@ -182,8 +182,7 @@ named_numbers <- function(space, numbers) {
 
 # The same as columns of a table.
 decoded_actions <- function(space, numbers) {
-  actions <- named_numbers(space, numbers)
-  if (is.data.frame(actions)) actions else data.frame(action = actions)
+  data.frame(value_columns(space, numbers, "action"), check.names = FALSE)
 }
 
 #' Return the numbers of some values

@@ -17,14 +17,13 @@ array_writer.default <- function(space, n) function(values) NULL
 
 #' @exportS3Method
 array_writer.gym_space_discrete <- function(space, n) {
-  if (!within_integer(unlist(space_bounds(space)))) {
-    array_writer.default(space, n)
-  } else if (!is.null(n)) {
+  are_integers <- within_integer(unlist(space_bounds(space)))
+  if (are_integers && !is.null(n)) {
     function(values) {
       integers <- if (length(values) == n && is.null(dim(values))) small_integers(values)
       if (!is.null(integers)) integer_bytes(integers)
     }
-  } else if (space$n <= most_prepared) {
+  } else if (are_integers && space$n <= most_prepared) {
     discrete_writer(space)
   } else {
     array_writer.default(space, n)

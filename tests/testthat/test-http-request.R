@@ -10,6 +10,16 @@ test_that("an answer that does not come within the timeout is an error", {
 # Steps and resets by HTTP.
 messages_to <- function(id) paste0("POST /v1/envs/", id, "/stream/")
 
+# An environment after its reset, and a client whose connections break at its messages.
+local_cut_env <- function(when, times, frame = parent.frame()) {
+  server <- local_server(frame = frame)
+  id <- env_create(server, "CartPole-v1")
+  env_reset(server, id)
+  client <- local_cut_client(server, when, messages_to(id), times, frame)
+  steps <- function() get_request(server, paste0("/v1/envs/", id, "/"))$steps
+  list(client = client, id = id, steps = steps)
+}
+
 test_that("a step whose answer was lost is not taken twice", {
   server <- local_server()
   id <- env_create(server, "CartPole-v1", seed = 1)
@@ -37,22 +47,16 @@ test_that("creating is not done twice, nor is closing", {
 
 test_that("a call that was cut before it was sent is made", {
   skip_unless_all()
-  server <- local_server()
-  id <- env_create(server, "CartPole-v1", seed = 1)
-  env_reset(server, id)
-  client <- local_cut_client(server, "unsent", messages_to(id), times = 2)
-  expect_equal(env_step(client, id, 1)$reward, 1)
-  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+  cut <- local_cut_env("unsent", times = 2)
+  expect_equal(env_step(cut$client, cut$id, 1)$reward, 1)
+  expect_equal(cut$steps(), 1)
 })
 
 test_that("a connection that breaks each time is an error in the end", {
   skip_unless_all()
-  server <- local_server()
-  id <- env_create(server, "CartPole-v1")
-  env_reset(server, id)
-  client <- local_cut_client(server, "answered", messages_to(id), times = 100)
-  expect_error(env_step(client, id, 1), class = "gym_error_connection")
-  expect_equal(get_request(server, paste0("/v1/envs/", id, "/"))$steps, 1)
+  cut <- local_cut_env("answered", times = 100)
+  expect_error(env_step(cut$client, cut$id, 1), class = "gym_error_connection")
+  expect_equal(cut$steps(), 1)
 })
 
 test_that("a call without a number is not repeated", {
