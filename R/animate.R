@@ -71,26 +71,15 @@ animate.gym_rollout <- function(x, file = NULL, fps = NULL, ..., episode = 1, wi
 
 #' @rdname animate
 #' @export
-animate.gym_search <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
-                               every = NULL) {
+animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
+                                 every = NULL, client = x$client %||% gym_client()) {
   check_dots_empty(...)
   check_found(x)
-  animate(
-    x$policy, file, fps, env = x$env %||% x$env_id, seed = seed, max_steps = x$max_steps,
-    width = width, every = every, client = x$client
-  )
-}
-
-#' @rdname animate
-#' @export
-animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, width = NULL,
-                                 every = NULL, client = gym_client()) {
-  check_dots_empty(...)
   # Not exec(), which would start a server for an environment that needs none.
   animate_episode(
     rlang::inject(rollout(
-      x$env, x$policy, max_steps = x$max_steps, seed = seed, client = client, frames = TRUE,
-      !!!x$kwargs
+      x$env %||% x$env_id, x$policy, max_steps = x$max_steps, seed = seed, client = client,
+      frames = TRUE, !!!x$kwargs
     )),
     file, fps, width, every
   )
@@ -122,7 +111,7 @@ register_with_gganimate <- function() {
 
 # `home`: the environment of the generic function.
 register_animate <- function(home) {
-  for (class in c("gym_rollout", "gym_search", "gym_training", "gym_policy")) {
+  for (class in c("gym_rollout", "gym_training", "gym_policy")) {
     method <- get(paste0("animate.", class), topenv())
     registerS3method("animate", class, method, envir = home)
   }

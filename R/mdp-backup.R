@@ -6,9 +6,10 @@
 #' Row s + S * (a - 1) belongs to state s and action a, both counted from 1, of S states. The
 #' columns are the transitions from there; the last ones may be empty.
 #' @param call The user's call.
-#' @return A list: `states` and `actions`, their numbers; `next_state` (from 1), `probability`,
-#'   `terminated` and `weight`, matrices, where the weight is the probability that the episode goes
-#'   on there; `expected`, the expected reward of each row; `possible`, whether the action is valid.
+#' @return A list: `states` and `actions`, their numbers; `next_state` (from 1) and `weight`,
+#'   matrices, where the weight is the probability that the episode goes on there; and for each row
+#'   `ends`, the probability that the episode ends, `expected`, the expected reward, and `possible`,
+#'   whether the action is valid.
 #' @noRd
 backup_of <- function(model, call) {
   table <- numbered_transitions(model)
@@ -28,16 +29,14 @@ backup_of <- function(model, call) {
     matrix[at] <- values
     matrix
   }
-  probability <- filled(table$probability)
-  rewards <- probability * filled(table$reward)
+  rewards <- filled(table$probability * table$reward)
   expected <- rowSums(rewards)
   # Rewards that cancel out leave only rounding errors.
   expected[abs(expected) <= 4 * .Machine$double.eps * rowSums(abs(rewards))] <- 0
   with_flow(list(
     states = states, actions = actions,
-    next_state = filled(table$to, 1L),
-    probability = probability, terminated = filled(table$terminated, TRUE),
-    weight = filled(table$probability * !table$terminated),
+    next_state = filled(table$to, 1L), weight = filled(table$probability * !table$terminated),
+    ends = rowSums(filled(table$probability * table$terminated)),
     expected = expected, possible = seq_len(shape[[1L]]) %in% row
   ))
 }
@@ -80,10 +79,10 @@ pair_rows <- function(model, row, action) {
   row + length(model$start) * (action_columns(model, action) - 1L)
 }
 
-# The transitions in the order of their pairs, with the columns `pair`, `from` and `to`, the numbers
-# of pairs and states.
+# The possible transitions, sorted by their pairs, with the columns `pair`, `from` and `to`: the
+# numbers of pairs and states.
 numbered_transitions <- function(model) {
-  table <- model$transitions
+  table <- model$transitions[model$transitions$probability > 0, ]
   table$from <- state_rows(model, table$state)
   table$to <- state_rows(model, table$next_state)
   table$pair <- pair_rows(model, table$from, table$action)
@@ -131,11 +130,10 @@ mean_values <- function(q, probabilities) {
 chain_of <- function(backup, probabilities) {
   moves <- policy_moves(backup, probabilities)
   mean_of <- function(x) mean_values(array(x, dim(probabilities)), probabilities)
-  end <- rowSums(backup$probability * backup$terminated)
   list(
     weight = flow_matrix(moves$from, moves$to, moves$weight, backup$states),
     from = moves$from, to = moves$to,
-    reward = mean_of(backup$expected), ends = mean_of(end) > 0 | rowSums(probabilities) == 0
+    reward = mean_of(backup$expected), ends = mean_of(backup$ends) > 0 | rowSums(probabilities) == 0
   )
 }
 

@@ -82,16 +82,28 @@ compare_starts <- function(check, model, starts) {
   }
 }
 
+# The first step that the model does not have: by where it led, whether the episode ended there, or
+# the reward.
 compare_steps <- function(check, model, steps) {
   table <- model$transitions[model$transitions$probability > 0, ]
-  one <- first_unlike(steps, table)
-  if (is.null(one)) {
+  parts <- c("state", "action", "next_state", "terminated", "reward")
+  # Rewards may have been rounded.
+  key <- function(rows, first) {
+    rows$reward <- signif(rows$reward, 7L)
+    do.call(paste, rows[parts[seq_len(first)]])
+  }
+  for (first in 3:5) {
+    unlike <- which(!key(steps, first) %in% key(table, first))
+    if (length(unlike)) break
+  }
+  if (!length(unlike)) {
     return(invisible())
   }
+  one <- steps[unlike[[1L]], ]
   led <- paste0("Action ", one$action, " led from state ", one$state, " to state ",
                 one$next_state, " in play")
   note_finding(check, "model", switch(
-    one$unlike,
+    parts[[first]],
     next_state = paste0(led, ", which has the probability 0 in the model."),
     terminated = paste0(
       led,
@@ -102,32 +114,9 @@ compare_steps <- function(check, model, steps) {
       }
     ),
     reward = {
-      same <- step_keys(table)$terminated == step_keys(one)$terminated
+      known <- unique(table$reward[key(table, 4L) == key(one, 4L)])
       paste0(led, " for the reward ", number_text(one$reward), ", which by the model is ",
-             paste(number_text_each(unique(table$reward[same])), collapse = " or "), ".")
+             paste(number_text_each(known), collapse = " or "), ".")
     }
   ))
-}
-
-# The first step that the table does not have, and the column that differs, or `NULL`.
-first_unlike <- function(steps, table) {
-  played <- step_keys(steps)
-  known <- step_keys(table)
-  for (name in names(played)) {
-    unlike <- !played[[name]] %in% known[[name]]
-    if (any(unlike)) {
-      return(c(as.list(steps[which(unlike)[[1L]], ]), unlike = name))
-    }
-  }
-}
-
-# Texts that are equal for equal steps: the next state, the end and the reward, which may have been
-# rounded.
-step_keys <- function(steps) {
-  next_state <- paste(steps$state, steps$action, steps$next_state)
-  terminated <- paste(next_state, steps$terminated)
-  list(
-    next_state = next_state, terminated = terminated,
-    reward = paste(terminated, signif(steps$reward, 7L))
-  )
 }

@@ -50,7 +50,12 @@ swept_values <- function(weight, rewards) {
   most <- 500L
   every <- 25L
   bounded <- growth_bounds(weight)
-  ahead <- if (is.matrix(weight)) padded_product(weight) else function(x) as.vector(weight %*% x)
+  ahead <- if (is.matrix(weight)) {
+    used <- which(t(weight) > 0, arr.ind = TRUE)
+    padded_product(used[, 2L], used[, 1L], weight[used[, 2:1, drop = FALSE]], nrow(weight))
+  } else {
+    function(x) times(weight, x)
+  }
   values <- rewards
   before <- Inf
   for (sweep in seq_len(most)) {
@@ -72,18 +77,16 @@ swept_values <- function(weight, rewards) {
   }
 }
 
-# A function that multiplies a full matrix by a vector. It uses only the non-zero numbers, which are
-# moved to the left.
-padded_product <- function(weight) {
-  at <- which(t(weight) > 0, arr.ind = TRUE)
-  from <- at[, 2L]
-  place <- sequence(rle(from)$lengths)
-  shape <- c(nrow(weight), max(place, 1L))
-  column <- array(1L, shape)
-  column[cbind(from, place)] <- at[, 1L]
+# A function that multiplies a matrix by a vector. The matrix is given by its non-zero numbers, row
+# by row. Only these are used: they are moved to the left.
+padded_product <- function(row, column, number, rows) {
+  at <- cbind(row, sequence(rle(row)$lengths))
+  shape <- c(rows, max(at[, 2L], 1L))
+  columns <- array(1L, shape)
+  columns[at] <- column
   left <- array(0, shape)
-  left[cbind(from, place)] <- weight[at[, 2:1, drop = FALSE]]
-  function(x) .rowSums(left * x[column], shape[[1L]], shape[[2L]])
+  left[at] <- number
+  function(x) .rowSums(left * x[columns], shape[[1L]], shape[[2L]])
 }
 
 #' Prepare to estimate values from their growth in a sweep

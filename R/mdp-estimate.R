@@ -1,7 +1,7 @@
 #' Estimate a model from steps
 #'
-#' Count in played steps how often each action led where and with which reward, and use the shares
-#' as probabilities (maximum likelihood). Actions that were never tried are not in the model.
+#' Estimate the probability of each transition by its share among the played steps with the same
+#' state and action (maximum likelihood). Actions that were never tried are not in the model.
 #'
 #' @param x The result of [rollout()] with `steps = TRUE, next_observation = TRUE`, or a data frame
 #'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`. The columns

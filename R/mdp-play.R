@@ -81,14 +81,15 @@ state_without_end <- function(model) {
   if (length(trap)) state_numbers(model$observation_space)[[trap[[1L]]]]
 }
 
-# The moves of a model, and the states that are reached from its start.
+# The moves of a model that are possible, and the states in which an episode may choose an action:
+# those that are reached from its start.
 ways_of <- function(model) {
   moves <- numbered_transitions(model)
-  moves <- moves[moves$probability > 0, ]
   leads <- function(reached) {
     seq_along(reached) %in% moves$to[reached[moves$from] & !moves$terminated]
   }
-  c(moves[c("from", "to", "terminated")], list(reached = closure(leads, model$start > 0)))
+  c(moves[c("from", "to", "reward", "terminated")],
+    list(reached = closure(leads, model$start > 0)))
 }
 
 #' Prepare the drawing of a model's transitions
@@ -99,7 +100,6 @@ ways_of <- function(model) {
 #' @noRd
 moves_of <- function(model) {
   table <- numbered_transitions(model)
-  table <- table[table$probability > 0, ]
   until <- cumsum(table$probability)
   pairs <- length(model$start) * as.integer(model$action_space$n)
   first <- match(seq_len(pairs), table$pair)

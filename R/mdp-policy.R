@@ -85,9 +85,7 @@ rows_of_actions <- function(actions, model, arg, call) {
     must <- paste("the number of an action for each of", count_of(length(model$start), "state"))
     abort_argument(actions, must, arg, call)
   }
-  probabilities <- matrix(0, length(actions), count)
-  probabilities[cbind(seq_along(actions), columns)] <- 1
-  probabilities
+  one_hot(columns, count)
 }
 
 # The probability of each action in each state of a model that the policy is bound to.
@@ -196,26 +194,22 @@ expected_return <- function(model, backup, probabilities, limit, discount, call)
   start_mean(model, limited_values(backup, probabilities, limit, discount, call))
 }
 
-# The cost of a sweep grows with the number of moves: a row of the matrices has a state's moves.
 limited_values <- function(backup, probabilities, limit, discount, call) {
   if (limit == Inf) {
     return(policy_values(backup, probabilities, discount, call)$values)
   }
   moves <- policy_moves(backup, probabilities)
   sorted <- order(moves$from, method = "radix")
-  from <- moves$from[sorted]
-  place <- sequence(rle(from)$lengths)
-  next_state <- array(1L, c(backup$states, max(place, 1L)))
-  weight <- array(0, dim(next_state))
-  next_state[cbind(from, place)] <- moves$to[sorted]
-  weight[cbind(from, place)] <- discount * moves$weight[sorted]
+  ahead <- padded_product(
+    moves$from[sorted], moves$to[sorted], discount * moves$weight[sorted], backup$states
+  )
   reward <- mean_values(array(backup$expected, dim(probabilities)), probabilities)
   values <- numeric(backup$states)
   for (sweep in seq_len(limit)) {
-    ahead <- reward + .rowSums(weight * values[next_state], nrow(weight), ncol(weight))
+    new <- reward + ahead(values)
     # From here on all sweeps give the same values.
-    if (identical(ahead, values)) break
-    values <- ahead
+    if (identical(new, values)) break
+    values <- new
   }
   values
 }

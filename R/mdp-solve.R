@@ -6,7 +6,7 @@
 #' # Which value
 #'
 #' The value of an environment with a step limit can mean three things. The result prints those that
-#' it has, for the start:
+#' were computed, for the start:
 #'
 #' - The value without the limit, as if episodes were never cut off. `solve_mdp(model)` computes it.
 #' - The value of the same policy with the model's limit, `max_episode_steps`: the expected return
@@ -21,11 +21,12 @@
 #' # Methods
 #'
 #' Value iteration applies Bellman's equation to all states together until the values do not change
-#' any more, or 20,000 times. Policy iteration then continues from the resulting policy, and mostly
-#' confirms it. Policy iteration computes the values of a policy, improves it, and so on. It finds
-#' the values by sweeps if few are enough, and otherwise by solving the policy's linear equations,
-#' which are sparse from 500 states on. Without a discount, a state that can stay forever without a
-#' reward has a value of at least 0, and a state from which no policy is sure to end has `-Inf`.
+#' any more, or 20,000 times. Policy iteration then continues from the resulting policy, which is
+#' usually the best one already. Policy iteration alternates between computing the values of a
+#' policy and improving it. It computes values by sweeps if few are enough, and otherwise by solving
+#' the policy's linear equations, with sparse matrices from 500 states on. Without a discount, a
+#' state that can stay forever without a reward has a value of at least 0, and a state from which no
+#' policy is sure to end has `-Inf`.
 #'
 #' Two actions are equal if their values differ by less than 1e-12 of their size, which is that of
 #' the rewards in their sums. If several actions are equal, which is common with a discount of 1,
@@ -97,21 +98,23 @@ solve_mdp <- function(model, policy = NULL, discount = 1, horizon = NULL,
   call <- rlang::current_env()
   backup <- backup_of(model, call)
   probabilities <- if (!is.null(policy)) policy_matrix(policy, model, call)
-  notes <- new_sweep_notes(backup, trace)
+  swept <- if (trace) list(numeric(backup$states))
+  see <- function(values) if (trace) swept[[length(swept) + 1L]] <<- values
   found <- if (!is.null(horizon)) {
-    solve_horizon(backup, horizon, discount, probabilities, notes, call)
+    solve_horizon(backup, horizon, discount, probabilities, see, call)
   } else if (!is.null(policy)) {
     values <- policy_values(backup, probabilities, discount, call)$values
     list(values = values, sweeps = 0L)
   } else {
-    best_endless_values(backup, discount, method, notes$see, call)
+    best_endless_values(backup, discount, method, see, call)
   }
   abort_if(
     is.null(policy) && !is.finite(start_mean(model, found$values)), "discount", 1, call,
     "Episodes of {model$spec$id} never end, and without a discount their values are infinite.",
     i = "Give a `discount` below 1, or a `horizon`."
   )
-  new_solution(model, backup, found, policy, probabilities, discount, horizon, method, notes)
+  new_solution(model, backup, found, policy, probabilities, discount, horizon, method,
+               if (trace) do.call(rbind, swept))
 }
 
 check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
@@ -120,46 +123,40 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   }
 }
 
-# Keeps the values of each sweep, if requested, and the actions.
-new_sweep_notes <- function(backup, trace) {
-  notes <- rlang::env(trace = if (trace) list(numeric(backup$states)), choices = list())
-  notes$see <- function(values, q) {
-    if (trace) notes$trace[[length(notes$trace) + 1L]] <- values
-  }
-  notes
-}
-
-# The sweep after which i steps remain chooses the action of the i-th step from the end.
-solve_horizon <- function(backup, horizon, discount, probabilities, notes, call) {
+#' Compute the values, of a policy or the best ones, with a number of steps to go
+#' @param see A function that is called with the values after each sweep.
+#' @noRd
+solve_horizon <- function(backup, horizon, discount, probabilities, see, call) {
   best <- is.null(probabilities)
   if (best) {
     check_fits_memory(as.double(horizon) * backup$states, "Keeping the action of each step", call)
   }
-  sizes <- numeric(backup$states)
-  values_of <- if (best) best_values else function(q) mean_values(q, probabilities)
-  values <- horizon_values(backup, horizon, discount, values_of, function(values, q) {
-    notes$see(values, q)
-    notes$q <- q
+  values <- sizes <- numeric(backup$states)
+  choices <- vector("list", horizon)
+  # The last sweep is that of the first step.
+  for (step in rev(seq_len(horizon))) {
+    q <- action_values(backup, values, discount)
+    values <- if (best) best_values(q) else mean_values(q, probabilities)
+    see(values)
     if (best) {
-      sizes <<- pmax(sizes, abs(values))
-      notes$choices[[length(notes$choices) + 1L]] <- first_of(tied_actions(q, sizes))
+      sizes <- pmax(sizes, abs(values))
+      choices[[step]] <- first_of(tied_actions(q, sizes))
     }
-  })
-  list(values = values, sweeps = horizon, q = notes$q)
+  }
+  list(values = values, sweeps = horizon, q = q, choice = do.call(cbind, choices))
 }
 
 new_solution <- function(model, backup, found, policy, probabilities, discount, horizon, method,
-                         notes) {
+                         trace) {
   q <- found$q %||% action_values(backup, found$values, discount)
   first_action <- as.integer(model$action_space$start)
   actions <- NULL
   if (is.null(policy)) {
-    choice <- found$choice %||% do.call(cbind, rev(notes$choices))
-    actions <- choice + first_action - 1L
+    actions <- found$choice + first_action - 1L
     # In a terminal state there is nothing to do; the states of a matrix are its rows.
     actions[rowSums(possible_of(backup)) == 0] <- NA
     if (is.null(horizon)) {
-      probabilities <- choice_probabilities(backup, choice)
+      probabilities <- choice_probabilities(backup, found$choice)
       # Any action will do in a state without actions.
       taken <- probabilities
       taken[rowSums(taken) == 0, 1L] <- 1
@@ -176,8 +173,7 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
       q = array(q, dim(q), list(names(model$start), value_labels(model$action_space))),
       actions = actions, policy = if (is.null(horizon)) policy,
       start_value = start_mean(model, found$values), limited = limited,
-      trace = if (!is.null(notes$trace)) do.call(rbind, notes$trace),
-      model = model, discount = discount, horizon = horizon,
+      trace = trace, model = model, discount = discount, horizon = horizon,
       method = if (is.null(policy) && is.null(horizon) || !is.null(actions)) method,
       sweeps = as.integer(found$sweeps)
     ),

@@ -1,4 +1,4 @@
-# Values of a given policy, and optimal values: within a number of steps, and without a limit.
+# Values of a given policy, and optimal values, without a limit of steps.
 
 # Value iteration ends if no state's value changes by more than this, relative to its size, taking
 # the discount into account. If that takes longer, policy iteration continues.
@@ -9,24 +9,6 @@ most_sweeps <- 20000L
 # smaller gain is worth taking if it occurs often, down to rounding errors.
 tie_tolerance <- 1e-12
 least_gain <- 1e-14
-
-# Within a number of steps ------------------------------------------------------------
-
-#' Compute values with a number of steps to go
-#'
-#' @param values_of A function of action values that returns those of the states.
-#' @param see A function that is called with the values after each sweep.
-#' @return The values of states with all steps to go.
-#' @noRd
-horizon_values <- function(backup, horizon, discount, values_of, see = function(values, q) NULL) {
-  values <- numeric(backup$states)
-  for (sweep in seq_len(horizon)) {
-    q <- action_values(backup, values, discount)
-    values <- values_of(q)
-    see(values, q)
-  }
-  values
-}
 
 # Of a policy, without a limit -----------------------------------------------------------
 
@@ -45,7 +27,8 @@ policy_values <- function(backup, probabilities, discount, call) {
   equations <- rep(TRUE, backup$states)
   if (discount == 1) {
     leads <- function(reached) times(weight, reached) > 0
-    resting <- never_rewarded(chain)
+    # After these neither a reward nor an end comes.
+    resting <- !closure(leads, chain$reward != 0 | chain$ends)
     good <- closure(leads, chain$ends | resting)
     # A state that can reach the end may also reach one from which it never comes.
     endless <- if (all(good)) !good else closure(leads, !good)
@@ -63,18 +46,6 @@ policy_values <- function(backup, probabilities, discount, call) {
     sizes[equations] <- gains + losses
   }
   list(values = values, sizes = sizes)
-}
-
-# The states after which neither a reward nor an end comes.
-never_rewarded <- function(chain) {
-  resting <- chain$reward == 0 & !chain$ends
-  repeat {
-    stays <- resting & times(chain$weight, !resting) == 0
-    if (identical(stays, resting)) {
-      return(resting)
-    }
-    resting <- stays
-  }
 }
 
 # The rewards that come forever are those of the states that the policy always returns to.
@@ -135,7 +106,7 @@ best_endless_values <- function(backup, discount, method, see, call) {
   swept <- if (method == "value_iteration") iterate_values(task$backup, discount, see)
   choice <- starting_choice(task$backup, swept$tied, discount)
   found <- iterate_policies(
-    task$backup, choice, discount, if (is.null(swept)) see else function(values, q) NULL, call
+    task$backup, choice, discount, call, if (is.null(swept)) see else function(values) NULL
   )
   choice <- soonest_choice(task$backup, found, discount, call)
   values <- found$values
@@ -152,7 +123,7 @@ iterate_values <- function(backup, discount, see) {
   for (sweep in seq_len(most_sweeps)) {
     q <- action_values(backup, values, discount)
     new <- best_values(q)
-    see(new, q)
+    see(new)
     change <- abs(new - values)
     values <- new
     # A value that came down to 0 is only as accurate as the values it came from.
@@ -173,25 +144,26 @@ starting_choice <- function(backup, tied, discount) {
 }
 
 #' Improve a policy until no action is better by more than rounding
-#' @param see As for [horizon_values()].
+#' @param see As for [solve_horizon()].
 #' @param least The smallest improvement, relative to the size of the values.
 #' @return A list: `values` and `sizes`, `choice`, `tied` (which actions are equally good), and
 #'   `sweeps`.
 #' @noRd
-iterate_policies <- function(backup, choice, discount, see, call, least = least_gain) {
+iterate_policies <- function(backup, choice, discount, call, see = function(values) NULL,
+                             least = least_gain) {
   seen <- list()
   for (sweep in seq_len(1000L)) {
     found <- policy_values(backup, choice_probabilities(backup, choice), discount, call)
     values <- found$values
     if (!all(is.finite(values))) {
       if (least < tie_tolerance) { # It may be rounding that led into a circle.
-        return(iterate_policies(backup, c(seen, list(choice))[[1L]], discount, see, call,
+        return(iterate_policies(backup, c(seen, list(choice))[[1L]], discount, call, see,
                                 tie_tolerance))
       }
       abort_endless(which(!is.finite(values))[[1L]], call)
     }
     q <- action_values(backup, values, discount)
-    see(values, q)
+    see(values)
     own <- cbind(seq_along(choice), choice)
     better <- !tied_actions(q, found$sizes, least)[own] & q[own] > -Inf
     seen[[sweep]] <- choice
@@ -218,8 +190,7 @@ first_of <- function(actions) best_column(actions + 0)
 possible_of <- function(backup) array(backup$possible, c(backup$states, backup$actions))
 
 choice_probabilities <- function(backup, choice) {
-  probabilities <- matrix(0, backup$states, backup$actions)
-  probabilities[cbind(seq_along(choice), choice)] <- 1
+  probabilities <- one_hot(choice, backup$actions)
   probabilities[!backup$possible] <- 0
   probabilities
 }
@@ -242,10 +213,7 @@ with_rest <- function(backup) {
   rested$actions <- backup$actions + 1L
   rested$next_state <- more(backup$next_state, 1L)
   rested$weight <- more(backup$weight, 0)
-  rested$terminated <- more(backup$terminated, TRUE)
-  certain <- matrix(0, backup$states, ncol(backup$weight))
-  certain[, 1L] <- 1
-  rested$probability <- rbind(backup$probability, certain)
+  rested$ends <- c(backup$ends, rep(1, backup$states))
   rested$expected <- c(backup$expected, numeric(backup$states))
   rested$possible <- c(backup$possible, rest$states)
   ending <- surely_ending(rested, possible_of(rested))
@@ -258,18 +226,12 @@ with_rest <- function(backup) {
 # The states that can stay forever without a reward, and the actions for it.
 resting_actions <- function(backup) {
   shape <- c(backup$states, backup$actions)
-  ends <- rowSums(backup$probability * backup$terminated) > 0
-  calm <- array(backup$possible & backup$expected == 0 & !ends, shape)
-  states <- rep(TRUE, backup$states)
-  repeat {
-    leaves <- array(rowSums(backup$weight > 0 & !states[backup$next_state]) > 0, shape)
-    actions <- calm & !leaves
-    stay <- states & rowSums(actions) > 0
-    if (identical(stay, states)) {
-      return(list(states = states, actions = actions & states))
-    }
-    states <- stay
+  calm <- array(backup$possible & backup$expected == 0 & backup$ends == 0, shape)
+  calm_beside <- function(leaves) {
+    calm & !array(rowSums(backup$weight > 0 & leaves[backup$next_state]) > 0, shape)
   }
+  leaves <- closure(function(leaves) rowSums(calm_beside(leaves)) == 0, logical(backup$states))
+  list(states = !leaves, actions = calm_beside(leaves) & !leaves)
 }
 
 # To rest is to take an action that stays without a reward.
@@ -318,7 +280,7 @@ ending_choice <- function(backup, allowed, call) {
   steps <- backup
   steps$expected <- rep(-1, length(backup$expected))
   steps$possible <- as.vector(ending$allowed)
-  found <- iterate_policies(steps, ending$choice, 1, function(values, q) NULL, call)
+  found <- iterate_policies(steps, ending$choice, 1, call)
   # Rounding differences must not decide, unless there are so many steps that one more is only
   # rounding, too.
   soonest <- first_of(found$tied)
@@ -336,9 +298,8 @@ ending_choice <- function(backup, allowed, call) {
 surely_ending <- function(backup, allowed) {
   shape <- c(backup$states, backup$actions)
   goes_on <- backup$weight > 0
-  ends <- backup$probability > 0 & backup$weight == 0
   any_of <- function(x) array(rowSums(x) > 0, shape)
-  can_end <- any_of(ends)
+  can_end <- array(backup$ends > 0, shape)
   states <- rep(TRUE, backup$states)
   repeat {
     leaves <- any_of(goes_on & !states[backup$next_state])

@@ -106,12 +106,14 @@ comparison_plot_data <- function(rollouts) {
     ),
     envs = env_names(rollouts),
     subtitle = c(
-      if (length(shown) < length(groups)) {
-        paste("the", length(shown), "of", length(groups), "policies with the highest mean returns")
-      },
+      if (length(shown) < length(groups)) best_policies_text(length(shown), length(groups)),
       episodes_each(lengths(shown)), if (length(by_env) > 1L) "dashed: median"
     )
   )
+}
+
+best_policies_text <- function(shown, all) {
+  paste("the", shown, "of", all, "policies with the highest mean returns")
 }
 
 episodes_each <- function(counts) {
@@ -177,9 +179,7 @@ autoplot.gym_evaluation <- function(object, ...) {
     picture_labels(
       env_text(attributes(object)),
       c(
-        if (!few) {
-          paste("the", most_rows, "of", nrow(object), "policies with the highest mean returns")
-        },
+        if (!few) best_policies_text(most_rows, nrow(object)),
         paste("bar:", level_text(attr(object, "level") %||% 0.95), "interval"),
         episodes_each(rows$episodes)
       ),

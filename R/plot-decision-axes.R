@@ -46,25 +46,22 @@ mapped_axes <- function(observed, x, y, call = rlang::caller_env()) {
     abort_wrong(if (is.null(x)) "x" else "y", NULL, call,
                 "`x` and `y` must name two parts of the observation.", i = observed_text(observed))
   }
-  axes <- c(axis_place(observed, x, "x", call), axis_place(observed, y, "y", call))
+  axes <- mapply(function(axis, arg) {
+    if (is_number(axis) && axis %in% seq_len(n)) {
+      return(as.integer(axis))
+    }
+    if (!rlang::is_string(axis) || !axis %in% observed$names) {
+      abort_wrong(arg, axis, call,
+                  "`{arg}` must be a part of the observation, not {describe_argument(axis)}.",
+                  i = observed_text(observed))
+    }
+    match(axis, observed$names)
+  }, list(x, y), c("x", "y"))
   if (axes[[1L]] == axes[[2L]]) {
     abort_wrong("y", y, call, "`x` and `y` must be two different parts of the observation.",
                 i = observed_text(observed))
   }
   axes
-}
-
-axis_place <- function(observed, axis, arg, call) {
-  n <- length(observed$names)
-  if (is_number(axis) && axis %in% seq_len(n)) {
-    return(as.integer(axis))
-  }
-  if (!rlang::is_string(axis) || !axis %in% observed$names) {
-    abort_wrong(arg, axis, call,
-                "`{arg}` must be a part of the observation, not {describe_argument(axis)}.",
-                i = observed_text(observed))
-  }
-  match(axis, observed$names)
 }
 
 observed_text <- function(observed) paste0("Its parts are ", few_names(observed$names), ".")

@@ -13,97 +13,76 @@ counted_map <- function(place, env, client, x, y, xlim, ylim, at, call) {
                 "A map of states shows actions that are Discrete, not
                  {format(place$action_space)}.")
   }
-  if (inherits(place$observation_space, "gym_space_discrete")) {
-    new_state_map(place, env, client, call)
+  space <- place$observation_space
+  index <- table_index(space, "observations", call)
+  map <- if (inherits(space, "gym_space_discrete")) {
+    grid <- data.frame(state = state_numbers(space))
+    list(grid = grid, x = "state", kind = "state", in_play = states_in_play(env, client))
   } else {
-    new_parts_map(place, x, y, xlim, ylim, at, call)
+    mapped_parts(space, x, y, xlim, ylim, at, call)
   }
-}
-
-# Whether a policy has an action in some rows of its table: one is valid, and not all valid ones
-# have the same value, as in states that were never visited. Other policies always have one.
-has_action <- function(policy, rows) {
-  if (!inherits(policy, "gym_policy_table")) {
-    return(rep(TRUE, length(rows)))
-  }
-  q <- policy$q[rows, , drop = FALSE]
-  valid <- rowSums(q > -Inf)
-  valid == 1 | rowSums(q == row_max(q)) < valid
-}
-
-# The actions in some of the states, `NA` in the others. `batch_at` gives the observations of rows.
-actions_where <- function(some, policy, batch_at, place) {
-  rows <- which(some)
-  actions <- rep(NA_integer_, length(some))
+  rows <- which(rep_len(map$in_play & has_action(place$policy), nrow(map$grid)))
+  map$grid$action <- NA_integer_
   if (length(rows)) {
-    chosen <- keep_random_state(act_batch(policy, batch_at(rows), length(rows), place))
-    actions[rows] <- as.integer(chosen)
+    place$call <- call
+    observed <- named_batch(space, index$value(rows))
+    map$grid$action[rows] <- as.integer(keep_random_state(
+      act_batch(greedy_policy(place$policy), observed, length(rows), place)
+    ))
   }
-  actions
+  if (map$kind == "parts") {
+    if (inherits(place$policy, "gym_policy_table")) map$grid$value <- row_max(place$policy$q)
+    map$grid <- map$grid[map$in_play, , drop = FALSE]
+    row.names(map$grid) <- NULL
+  }
+  map$in_play <- NULL
+  structure(class = c("gym_state_map", "gym_decision_map"), c(map, list(
+    actions = action_names(
+      place$env_id, as.integer(place$action_space$n), place$action_space$start
+    ),
+    observation_space = space, action_space = place$action_space, env_id = place$env_id,
+    wrappers = place$wrappers, policy = place$policy
+  )))
 }
 
-new_state_map <- function(place, env, client, call) {
+# Whether a policy has an action in each row of its table: one is valid, and not all valid ones have
+# the same value, as in states that were never visited. Other policies always have one.
+has_action <- function(policy) {
+  if (!inherits(policy, "gym_policy_table")) {
+    return(TRUE)
+  }
+  valid <- rowSums(policy$q > -Inf)
+  valid == 1 | rowSums(policy$q == row_max(policy$q)) < valid
+}
+
+# The states in which an episode may choose an action: all, if there is no model.
+states_in_play <- function(env, client) {
   none <- function(cnd) NULL
   model <- tryCatch(
     if (!is.null(env)) env_model(env, client = client),
     gym_error_no_model = none, gym_error_http_400 = none
   )
-  # The states in which an episode may choose an action: all, if there is no model.
-  in_play <- if (is.null(model)) TRUE else state_kinds(model)$reached
-  space <- place$observation_space
-  states <- state_numbers(space)
-  place$call <- call
-  actions <- actions_where(
-    in_play & has_action(place$policy, seq_along(states)),
-    greedy_policy(place$policy), function(rows) states[rows], place
-  )
-  structure(class = c("gym_state_map", "gym_decision_map"), list(
-    grid = data.frame(state = states, action = actions), x = "state", kind = "state",
-    observation_space = space, action_space = place$action_space, env_id = place$env_id,
-    wrappers = place$wrappers, policy = place$policy
-  ))
+  if (is.null(model)) TRUE else ways_of(model)$reached
 }
 
-#' Map a policy whose observations have several parts with few values each
-#'
-#' @param x,y,xlim,ylim,at As for [decision_map()].
-#' @return As [decision_map()]; `panels` are the names of the parts on no axis.
-#' @noRd
-new_parts_map <- function(place, x, y, xlim, ylim, at, call) {
-  space <- place$observation_space
-  index <- table_index(space, "observations", call)
+# The map of observations that have several parts, without actions. `in_play` tells which rows to
+# show; `panels` are the names of the parts on no axis.
+mapped_parts <- function(space, x, y, xlim, ylim, at, call) {
   grid <- all_values(space)
   observed <- list(names = names(grid))
   axes <- if (is.null(x) && is.null(y)) 1:2 else mapped_axes(observed, x, y, call)
-  ends <- list(xlim, ylim)
-  shown <- rep(TRUE, nrow(grid))
-  for (i in seq_along(axes)) {
-    if (!is.null(ends[[i]])) {
-      values <- grid[[axes[[i]]]]
-      shown <- shown & values >= ends[[i]][[1L]] & values <= ends[[i]][[2L]]
-    }
-  }
   if (!is.null(at)) {
     observed$low <- observed$high <- numeric(length(grid))
     held_at(observed, axes, at, call)
-    for (name in names(at)) shown <- shown & grid[[name]] == at[[name]]
   }
-  grid <- grid[shown, , drop = FALSE]
-  row.names(grid) <- NULL
-  place$call <- call
-  rows <- which(shown)
-  grid$action <- actions_where(
-    has_action(place$policy, rows), place$policy,
-    function(some) named_batch(space, index$value(rows[some])), place
+  axes <- observed$names[axes]
+  ends <- c(stats::setNames(list(xlim, ylim), axes), lapply(at, rep, 2L))
+  in_play <- rep(TRUE, nrow(grid))
+  for (name in names(ends)[lengths(ends) > 0L]) {
+    in_play <- in_play & grid[[name]] >= ends[[name]][[1L]] & grid[[name]] <= ends[[name]][[2L]]
+  }
+  list(
+    grid = grid, x = axes[[1L]], y = axes[[2L]], kind = "parts", in_play = in_play, at = at,
+    panels = setdiff(observed$names, c(axes, names(at)))
   )
-  if (inherits(place$policy, "gym_policy_table")) grid$value <- row_max(place$policy$q)[rows]
-  structure(class = c("gym_state_map", "gym_decision_map"), list(
-    grid = grid, x = observed$names[[axes[[1L]]]], y = observed$names[[axes[[2L]]]],
-    kind = "parts", panels = setdiff(observed$names[-axes], names(at)), at = at,
-    actions = action_names(
-      place$env_id, as.integer(place$action_space$n), place$action_space$start
-    ),
-    action_space = place$action_space, env_id = place$env_id,
-    wrappers = place$wrappers, policy = place$policy
-  ))
 }

@@ -143,7 +143,10 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   data <- if (by_parts) {
     parts_map_data(object)
   } else {
-    state_map_data(object, columns, directions, passenger, destination)
+    place_states(
+      data.frame(object$grid, ink = "black"), object$env_id, object, columns, directions,
+      passenger, destination, rlang::current_env()
+    )
   }
   if (type == "q") {
     if (!inherits(object$policy, "gym_policy_table")) {
@@ -180,20 +183,6 @@ taken_layers <- function(data) {
     ),
     action_layers(data, cells)
   )
-}
-
-#' Compute the data of a map of states
-#' @return As [solution_plot_data()], with `action`, a number or `NA`, instead of values, and the
-#'   `numbers` and `labels` of all actions.
-#' @noRd
-state_map_data <- function(x, columns, directions, passenger, destination,
-                           call = rlang::caller_env()) {
-  cells <- data.frame(x$grid, ink = "black")
-  side <- sqrt(nrow(cells))
-  own <- switch(known_grid(x$env_id), CliffWalking = 12L,
-                FrozenLake = if (side == trunc(side)) as.integer(side))
-  walls <- integer()
-  place_states(cells, x$env_id, x, columns, directions, own, passenger, destination, walls, call)
 }
 
 # The parts on the axes are the columns and the rows; `panels` are those of the other parts that

@@ -87,8 +87,12 @@ number_texts <- function(values) {
   largest <- max(abs(values[is.finite(values)]), 1e-6)
   # Three digits, with as many decimals for 1 as for 0.99.
   decimals <- max(0, 1 - floor(log10(largest) - 1e-6))
-  text <- sub("^-(0[.]?0*)$", "\\1", sprintf("%.*f", as.integer(decimals), values))
-  ifelse(is.na(values), "", text)
+  ifelse(is.na(values), "", fixed_texts(values, decimals))
+}
+
+# Without the sign of a number that is rounded to 0.
+fixed_texts <- function(values, decimals) {
+  sub("^-(0[.]?0*)$", "\\1", sprintf("%.*f", as.integer(decimals), values))
 }
 
 # White on dark colours, black on light ones.
@@ -117,9 +121,9 @@ known_grid <- function(id) {
   if (length(found)) found else ""
 }
 
-# Puts states into Taxi's city, or into a grid of so many columns.
-place_states <- function(cells, env_id, spaces, columns, directions, own_columns, passenger,
-                         destination, walls, call) {
+# Puts states into Taxi's city, or into a grid. `model` is that of the environment, if it is known.
+place_states <- function(cells, env_id, spaces, columns, directions, passenger, destination, call,
+                         model = NULL) {
   check_count(columns, allow_null = TRUE, call = call)
   known <- known_grid(env_id)
   numbers <- state_numbers(spaces$action_space)
@@ -130,30 +134,32 @@ place_states <- function(cells, env_id, spaces, columns, directions, own_columns
     abort_argument(directions, must, "directions", call)
   }
   cells$does <- directions[match(cells$action, numbers)]
-  c(
-    states_in_grid(cells, known, spaces$observation_space$values, columns, own_columns, passenger,
-                   destination, walls, call),
-    list(directions = directions, numbers = numbers, states = spaces$observation_space,
-         labels = action_names(env_id, length(numbers), numbers[[1L]]))
-  )
+  values <- spaces$observation_space$values
+  placed <- if (length(values) > 1L && is.null(columns)) {
+    named_cells(cells, values)
+  } else if (known == "Taxi" && is.null(columns)) {
+    taxi_cells(cells, passenger, destination, model, call)
+  } else {
+    numbered_cells(cells, columns %||% grid_columns(known, nrow(cells), model), call)
+  }
+  c(placed, list(
+    directions = directions, numbers = numbers, states = spaces$observation_space,
+    labels = action_names(env_id, length(numbers), numbers[[1L]])
+  ))
 }
 
-states_in_grid <- function(cells, known, values, columns, own_columns, passenger, destination,
-                           walls, call) {
-  if (length(values) > 1L && is.null(columns)) {
-    # The first column of names goes down, the second to the right, and others make panels.
-    axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))
-    cells$row <- match(values[[1L]], axes[[1L]])
-    cells$column <- match(values[[2L]], axes[[2L]])
-    panels <- names(values)[-(1:2)]
-    cells[panels] <- values[panels]
-    return(list(cells = cells, rows = length(axes[[1L]]), columns = length(axes[[2L]]),
-                axes = axes, panels = panels))
-  }
-  if (known == "Taxi" && is.null(columns)) {
-    return(taxi_cells(cells, passenger, destination, walls, call))
-  }
-  columns <- columns %||% own_columns
+# The first column of names goes down, the second to the right, and others make panels.
+named_cells <- function(cells, values) {
+  axes <- lapply(values[1:2], function(x) if (is.factor(x)) levels(x) else sort(unique(x)))
+  cells$row <- match(values[[1L]], axes[[1L]])
+  cells$column <- match(values[[2L]], axes[[2L]])
+  panels <- names(values)[-(1:2)]
+  cells[panels] <- values[panels]
+  list(cells = cells, rows = length(axes[[1L]]), columns = length(axes[[2L]]), axes = axes,
+       panels = panels)
+}
+
+numbered_cells <- function(cells, columns, call) {
   if (is.null(columns)) {
     return(list(cells = cells))
   }
@@ -167,6 +173,19 @@ states_in_grid <- function(cells, known, values, columns, own_columns, passenger
   list(cells = cells, columns = columns, rows = count / columns)
 }
 
+# The columns of a known grid. A step down adds their number to the state's: it is the most common
+# difference above 1.
+grid_columns <- function(known, count, model) {
+  if (!is.null(model) && known != "") {
+    further <- model$transitions$next_state - model$transitions$state
+    further <- further[further > 1L]
+    if (length(further)) as.integer(names(which.max(table(further))))
+  } else if (is.null(model)) {
+    side <- sqrt(count)
+    switch(known, CliffWalking = 12L, FrozenLake = if (side == trunc(side)) as.integer(side))
+  }
+}
+
 # The axis of states without a grid, with their names.
 state_axis <- function(space) {
   if (is.null(space$values)) {
@@ -178,17 +197,9 @@ state_axis <- function(space) {
   )
 }
 
-# A step down adds the number of columns to the state's number: it is the most common difference
-# above 1.
-grid_columns <- function(model) {
-  further <- model$transitions$next_state - model$transitions$state
-  further <- further[further > 1L]
-  if (length(further)) as.integer(names(which.max(table(further))))
-}
-
 # Taxi's state number encodes the row, the column, the passenger and the destination, see its
 # documentation.
-taxi_cells <- function(cells, passenger, destination, walls, call) {
+taxi_cells <- function(cells, passenger, destination, model, call) {
   check_count(passenger, min = 0, max = 4, call = call)
   check_count(destination, min = 0, max = 3, call = call)
   state <- cells$state
@@ -196,17 +207,14 @@ taxi_cells <- function(cells, passenger, destination, walls, call) {
   cells$row <- state %/% 100L + 1L
   cells$column <- state %/% 20L %% 5L + 1L
   cells <- cells[shown, ]
+  # There is a wall where a move to the right stays in place.
+  right <- model$transitions[model$transitions$action == 2L, ]
+  walls <- right$state[right$state == right$next_state & right$probability == 1]
   list(
     cells = cells, columns = 5L, rows = 5L,
     walls = cells[cells$column < 5L & cells$state %in% walls, c("row", "column")],
     stands = taxi_stands, from = passenger, to = destination
   )
-}
-
-# The states from which a move to the right stays in place.
-taxi_walls <- function(model) {
-  right <- model$transitions[model$transitions$action == 2L, ]
-  right$state[right$state == right$next_state & right$probability == 1]
 }
 
 # The walls and the letters of the stands.

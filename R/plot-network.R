@@ -128,18 +128,14 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   check_count(digits, min = 0, allow_null = TRUE, arg = "digits", call = call)
   layers <- length(policy$sizes)
   sizes <- policy$sizes + c(rep(as.integer(isTRUE(policy$bias)), layers - 1L), 0L)
-  each <- lapply(seq_len(layers), function(layer) {
+  units <- do.call(rbind, lapply(seq_len(layers), function(layer) {
     size <- sizes[[layer]]
     # If there are too many neurons, draw the first ones and the last one, with a gap for dots.
     shown <- if (size > most) c(seq_len(most - 2L), NA, size) else seq_len(size)
     y <- 1 - (seq_along(shown) - 0.5) / length(shown)
-    gap <- is.na(shown)
-    list(
-      neurons = data.frame(layer = layer, neuron = shown[!gap], x = layer - 1, y = y[!gap]),
-      dots = data.frame(x = rep(layer - 1, sum(gap)), y = y[gap])
-    )
-  })
-  neurons <- do.call(rbind, lapply(each, function(placed) placed$neurons))
+    data.frame(layer = layer, neuron = shown, x = layer - 1, y = y)
+  }))
+  neurons <- units[!is.na(units$neuron), ]
   neurons$bias <- neurons$neuron > policy$sizes[neurons$layer]
   neurons$label <- ""
   first <- neurons$layer == 1L
@@ -147,7 +143,7 @@ network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::ca
   neurons$label[first] <- c(input_labels(policy), "bias")[neurons$neuron[first]]
   neurons$label[last] <- output_labels(policy)[neurons$neuron[last]]
   list(
-    neurons = neurons, dots = do.call(rbind, lapply(each, function(placed) placed$dots)),
+    neurons = neurons, dots = units[is.na(units$neuron), c("x", "y")],
     weights = place_weights(policy, neurons, digits),
     layers = data.frame(x = seq_len(layers) - 1, label = c("observation", policy$activation))
   )
@@ -175,7 +171,7 @@ place_weights <- function(policy, neurons, digits) {
   weights$width <- if (largest > 0) abs(weights$weight) / largest else 0
   digits <- digits %||% if (nrow(weights) <= 24L) 2 else 0
   weights$label <- if (digits > 0) {
-    sub("^-(0[.]0+)$", "\\1", sprintf("%.*f", as.integer(digits), weights$weight))
+    fixed_texts(weights$weight, digits)
   } else {
     ""
   }

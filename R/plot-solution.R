@@ -10,8 +10,8 @@
 #' the best one in bold. Actions that are not directions are left out. Without a grid, each action
 #' has a row, with a dot at the best one.
 #'
-#' If all terminal states give the same reward, they are goals, unless going on gives more.
-#' Otherwise those with the largest reward are goals and the others are pits.
+#' If all terminal states give the same reward, they are goals, unless other steps give more on
+#' average. Otherwise those with the largest reward are goals and the others are pits.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -91,13 +91,11 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
     cells$action <- state_numbers(x$model$action_space)[best_column(x$policy$q)]
   }
   cells$action[row_max(x$q) == -Inf] <- NA
-  kinds <- state_kinds(x$model)
-  cells$end <- end_kinds(x$model, kinds)
-  cells$value[!kinds$reached] <- NA
-  id <- x$model$spec$id
+  moves <- ways_of(x$model)
+  cells$end <- end_kinds(x$model, moves)
+  cells$value[!moves$reached] <- NA
   placed <- place_states(
-    cells, id, x$model, columns, directions, if (known_grid(id) != "") grid_columns(x$model),
-    passenger, destination, taxi_walls(x$model), call
+    cells, x$model$spec$id, x$model, columns, directions, passenger, destination, call, x$model
   )
   cells <- placed$cells
   cells$does[is.na(cells$value) | is.na(cells$does)] <- ""
@@ -107,34 +105,16 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   placed
 }
 
-#' Find the states that episodes go through and those in which they end
-#' @return A list of two logical vectors: `reached`, the states in which an episode may choose an
-#'   action, and `ends`, those of the others that end an episode on arrival.
-#' @noRd
-state_kinds <- function(model) {
-  table <- model$transitions
-  table <- table[table$probability > 0, ]
-  from <- state_rows(model, table$state)
-  to <- state_rows(model, table$next_state)
-  goes_on <- !table$terminated
-  one_of <- function(rows) seq_along(model$start) %in% rows
-  reached <- closure(function(reached) one_of(to[goes_on & reached[from]]), model$start > 0)
-  list(reached = reached, ends = one_of(to[!goes_on & reached[from]]) & !reached)
-}
-
 # Is the end of an episode a goal or a pit? The rewards on arrival decide.
-end_kinds <- function(model, kinds) {
-  table <- model$transitions
-  table <- table[table$probability > 0, ]
-  to <- state_rows(model, table$next_state)
-  arrives <- table$terminated & kinds$ends[to] & kinds$reached[state_rows(model, table$state)]
-  reward <- as.vector(
-    tapply(table$reward[arrives], factor(to[arrives], seq_along(model$start)), max)
-  )
+end_kinds <- function(model, moves = ways_of(model)) {
+  arrives <- moves$terminated & moves$reached[moves$from] & !moves$reached[moves$to]
+  reward <- as.vector(tapply(
+    moves$reward[arrives], factor(moves$to[arrives], seq_along(model$start)), max
+  ))
   least <- if (length(unique(reward[!is.na(reward)])) > 1L) {
     max(reward, na.rm = TRUE)
   } else {
-    mean(table$reward[!table$terminated])
+    mean(moves$reward[!moves$terminated])
   }
   ifelse(is.na(reward), "", ifelse(reward >= least, "goal", "pit"))
 }
@@ -215,23 +195,33 @@ q_layers <- function(data) {
   )
 }
 
-end_marks <- function() {
-  list(goal = key_mark("green", shape = 18), pit = key_mark("ink", shape = 16))
+end_layers <- function(data) {
+  ends <- data$cells[data$cells$end != "", ]
+  ends$kind <- ends$end
+  c(
+    list(cell_tiles(data = ends, fill = "white")),
+    marked_points(ends, size = 0.45 * cell_width(data))
+  )
 }
 
-end_layers <- function(data) {
-  cells <- data$cells
-  there <- end_marks()[names(end_marks()) %in% cells$end]
-  c(
-    list(cell_tiles(data = cells[cells$end != "", ], fill = "white")),
-    lapply(names(there), function(end) {
-      ggplot2::geom_point(
-        ggplot2::aes(colour = end), cells[cells$end == end, ], shape = there[[end]]$shape,
-        size = 0.45 * cell_width(data)
-      )
-    }),
-    if (length(there)) key_of_marks(there)
+# Points with the mark of their `kind`, and the key.
+marked_points <- function(points, size) {
+  marks <- list(
+    value = key_mark("blue", shape = 16), goal = key_mark("green", shape = 18),
+    pit = key_mark("ink", shape = 16)
   )
+  marks <- marks[names(marks) %in% points$kind]
+  if (length(marks)) {
+    list(
+      ggplot2::geom_point(
+        ggplot2::aes(colour = .data$kind, shape = .data$kind), points, size = size
+      ),
+      ggplot2::scale_shape_manual(
+        values = vapply(marks, function(mark) mark$shape, 0), guide = "none"
+      ),
+      key_of_marks(marks)
+    )
+  }
 }
 
 # Without a grid ------------------------------------------------------------------
@@ -240,33 +230,24 @@ value_points <- function(data) {
   cells <- data$cells
   cells$value[cells$end != ""] <- 0
   cells$kind <- ifelse(cells$end == "", "value", cells$end)
-  cells$panel <- rep("value", nrow(cells))
-  taken <- cells[!is.na(cells$value) & cells$end == "" & nzchar(cells$does), ]
+  cells$panel <- "value"
+  taken <- cells[nzchar(cells$does), ]
   taken$value <- taken$action
   taken$panel <- rep(action_panel(data), nrow(taken))
   points <- rbind(cells, taken)
-  points <- points[!is.na(points$value), ]
-  panels <- unique(points$panel)
-  points$panel <- factor(points$panel, panels)
-  taken$panel <- factor(taken$panel, panels)
-  marks <- c(list(value = key_mark("blue", shape = 16)), end_marks())
-  there <- marks[names(marks) %in% points$kind]
+  points$panel <- factor(points$panel, unique(points$panel))
   ggplot2::ggplot(points, ggplot2::aes(.data$state, .data$value)) +
-    lapply(names(there), function(kind) {
-      ggplot2::geom_point(
-        ggplot2::aes(colour = kind), points[points$kind == kind, ], shape = there[[kind]]$shape,
-        size = 2
-      )
-    }) +
+    marked_points(points[!is.na(points$value), ], size = 2) +
     (if (nrow(taken)) {
       list(
         ggplot2::facet_wrap(
           ggplot2::vars(.data$panel), ncol = 1L, scales = "free_y", labeller = wrapped_strips(1)
         ),
-        ggplot2::geom_blank(data = replace(taken[c(1L, 1L), ], "value", range(data$numbers)))
+        ggplot2::geom_blank(
+          data = replace(utils::tail(points, 2L), "value", range(data$numbers))
+        )
       )
     }) +
-    key_of_marks(there) +
     state_axis(data$states) +
     ggplot2::scale_y_continuous(breaks = few_breaks) +
     ggplot2::labs(x = "state", y = if (!nrow(taken)) "value") +

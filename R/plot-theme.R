@@ -218,12 +218,6 @@ few_breaks <- function(limits, n = 5) {
   if (sum(at >= limits[[1L]] & at <= limits[[2L]]) > n) pretty(limits, n - 1) else at
 }
 
-# Rounds are whole numbers from 1, and so are their axis marks.
-round_ticks <- function(last) {
-  at <- unique(round(pretty(c(1, last))))
-  at[at >= 1 & at <= last]
-}
-
 returns_label <- "return (reward summed over an episode)"
 
 training_steps_label <- "steps of the environment"

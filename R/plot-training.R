@@ -151,7 +151,7 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
       ),
       target_mark(target)
     )) +
-    ggplot2::scale_x_continuous(breaks = round_ticks(max(means$round))) +
+    ggplot2::scale_x_continuous(breaks = function(limits) unique(round(few_breaks(limits)))) +
     picture_labels(
       paste("Random search in", env_text(object)), outcome, x = "round", y = "return"
     ) +

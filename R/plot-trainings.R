@@ -75,7 +75,7 @@ iterations_picture <- function(trainings, call = rlang::caller_env()) {
     ) +
     (if (several) ggplot2::facet_wrap(ggplot2::vars(.data$panel), ncol = 1L, drop = FALSE)) +
     number_axis(ggplot2::scale_x_continuous) +
-    ggplot2::scale_y_continuous(breaks = function(limits) unique(round(pretty(limits)))) +
+    ggplot2::scale_y_continuous(breaks = few_breaks) +
     picture_labels(
       trainings_title(trainings), if (!several) paste(counts, "seeds have reached the target"),
       x = paste(if (are_searches(trainings)) "rounds" else "iterations", "to the target"),

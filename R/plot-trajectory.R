@@ -1,23 +1,17 @@
 # An episode's observations and actions over its steps.
 
 trajectory_picture <- function(x, data) {
-  # The limits that are drawn.
-  keep <- vapply(seq_len(nrow(data$limits)), function(i) {
-    limit <- data$limits[i, ]
-    length(near_limits(limit$at, data$values$value[data$values$panel == limit$panel])) > 0L
-  }, NA)
-  near <- data$limits[keep, ]
-  near$panel <- factor(near$panel, data$panels$panel)
-  panels <- nrow(data$panels)
+  values <- data$values
+  panels <- nlevels(values$panel)
   columns <- if (panels > 3L) 2L else 1L
-  values <- panel_values(data)
   of_kind <- function(kind) values[values$kind == kind, ]
-  named <- levels(values$part)[nzchar(levels(values$part))]
+  named <- setdiff(levels(values$part), "")
   place <- ggplot2::aes(.data$time, .data$value, colour = .data$part)
   ggplot2::ggplot() +
     lapply(names(limit_colours), function(kind) {
       ggplot2::geom_hline(
-        ggplot2::aes(yintercept = .data$at), near[near$kind == kind, ], linetype = "dashed",
+        ggplot2::aes(yintercept = .data$at),
+        data$limits[data$limits$near & data$limits$kind == kind, ], linetype = "dashed",
         colour = limit_colours[[kind]]
       )
     }) +
@@ -40,7 +34,7 @@ trajectory_picture <- function(x, data) {
     ) +
     ggplot2::facet_wrap(
       ggplot2::vars(.data$panel), scales = "free_y", ncol = columns,
-      labeller = ggplot2::as_labeller(panel_titles(data), wrapped_strips())
+      labeller = ggplot2::as_labeller(data$titles, wrapped_strips())
     ) +
     ggplot2::scale_x_continuous(breaks = few_breaks) +
     ggplot2::scale_y_continuous(
@@ -56,18 +50,6 @@ trajectory_picture <- function(x, data) {
 
 limit_colours <- c(failure = gym_colours[["brown"]], goal = gym_colours[["green"]])
 ending_colours <- c(terminated = gym_colours[["brown"]], truncated = "grey50")
-
-# The values with the kind of their panel, and the number of an action as text, `""` if an action
-# has only one number.
-panel_values <- function(data) {
-  values <- data$values
-  values$kind <- data$panels$kind[match(values$panel, data$panels$panel)]
-  parts <- if (length(data$actions) > 1L) data$actions else character()
-  part <- unname(parts[values$name])
-  values$part <- factor(ifelse(is.na(part), "", part), c("", unname(parts)))
-  values$panel <- factor(values$panel, data$panels$panel)
-  values
-}
 
 # Discrete actions: a bar for each step, in the action's place and colour. Actions that never occur
 # have a place, too.
@@ -106,27 +88,19 @@ trajectory_breaks <- function(values) {
   }
 }
 
-# The titles of panels give the values at which episodes end.
-panel_titles <- function(data) {
-  labels <- data$panels$panel
-  text <- vapply(labels, function(label) {
-    unique(data$limits$text[data$limits$panel == label])[1L]
-  }, "")
-  stats::setNames(ifelse(is.na(text), labels, paste0(labels, ", ", text)), labels)
-}
-
 most_panels <- 8L
 # There are as many line colours.
 most_actions <- length(series_colours)
 
 #' Compute the data of a trajectory
 #' @param variables Names of columns, `NULL` for the observation's first.
-#' @return A list: `panels` (data frame with one row for each panel from the top: `panel`, its
-#'   label; `kind`, `"line"`, `"stairs"` for whole numbers, or `"choice"` for discrete actions),
-#'   `values` (data frame: `panel`, `name` (the column), `step`, `time` (the number of steps
-#'   before), `value`), `limits` (data frame: `panel`, `at`, `kind`, `text`), `choices` (data frame
-#'   `value`, `label`, of discrete actions, otherwise `NULL`), `actions` (labels of the actions'
-#'   columns, named by them), `length` and `ending`, `"terminated"` or `"truncated"`, `subtitle`.
+#' @return A list: `values` (data frame: `panel`, a factor of their labels; `kind` of the panel,
+#'   `"line"`, `"stairs"` for whole numbers, or `"choice"` for discrete actions; `name`, the column;
+#'   `part`, a factor of the names of an action's numbers, `""` where there are not several; `step`;
+#'   `time`, the number of steps before; `value`), `limits` (data frame: `panel`, `at`, `kind`,
+#'   `text`, and `near`, whether the values come near), `titles` (of the panels, named by them),
+#'   `choices` (data frame `value`, `label`, of discrete actions, otherwise `NULL`), `length` and
+#'   `ending`, `"terminated"` or `"truncated"`, `subtitle`.
 #' @noRd
 trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1,
                                  call = rlang::caller_env()) {
@@ -148,17 +122,28 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
   )
   kinds <- vapply(values, function(value) if (all_whole(value)) "stairs" else "line", "")
   kinds[shown$actions] <- if (!is.null(choices)) "choice" else kinds[shown$actions]
-  first <- !duplicated(labels)
+  kind <- unname(kinds)[match(labels, labels)]
+  # The numbers of an action are told apart by their colours.
+  parts <- rep("", length(values))
+  if (length(shown$actions) > 1L) {
+    parts[names(values) %in% shown$actions] <- action_parts(x$env_id, length(shown$actions))
+  }
+  limits <- trajectory_limits(described_id(x), values[shown$observed], labels)
+  ends <- limits$text[match(unique(labels), limits$panel)]
   n <- nrow(steps)
   list(
-    panels = data.frame(panel = labels[first], kind = unname(kinds[first])),
     values = data.frame(
-      panel = rep(labels, each = n), name = rep(names(values), each = n), step = steps$step,
+      panel = factor(rep(labels, each = n), unique(labels)), kind = rep(kind, each = n),
+      name = rep(names(values), each = n),
+      part = factor(rep(parts, each = n), unique(c("", parts))), step = steps$step,
       time = steps$step - 1L, value = as.numeric(unlist(lapply(values, as.numeric)))
     ),
-    limits = trajectory_limits(described_id(x), shown$observed, labels),
+    limits = limits,
+    # They give the values at which episodes end.
+    titles = stats::setNames(
+      paste0(unique(labels), ifelse(is.na(ends), "", paste0(", ", ends))), unique(labels)
+    ),
     choices = choices, length = n, ending = ending,
-    actions = stats::setNames(action_parts(x$env_id, length(shown$actions)), shown$actions),
     subtitle = paste0(
       if (!is.null(own$candidate)) paste0("candidate ", own$candidate, ", "), "episode ",
       own$episode, ": return ", number_text(own$return), ", ", ending, " after ",
@@ -255,22 +240,24 @@ action_title <- function(env_id, names) {
 
 trajectory_limits <- function(env_id, observed, labels) {
   limits <- episode_limits[[environment_family(env_id), exact = TRUE]]
-  rows <- lapply(intersect(observed, names(limits)), function(name) {
-    limit <- limits[[name]]
-    data.frame(
-      panel = labels[[match(name, observed)]], at = limit$at, kind = limit$kind, text = limit$text
-    )
+  rows <- lapply(which(names(observed) %in% names(limits)), function(i) {
+    limit <- limits[[names(observed)[[i]]]]
+    data.frame(panel = labels[[i]], limit, near = is_near(limit$at, observed[[i]]))
   })
-  none <- data.frame(panel = character(), at = numeric(), kind = character(), text = character())
-  do.call(rbind, c(list(none), rows))
+  none <- data.frame(
+    panel = character(), at = numeric(), kind = character(), text = character(), near = logical()
+  )
+  limits <- do.call(rbind, c(list(none), rows))
+  limits$panel <- factor(limits$panel, unique(labels))
+  limits
 }
 
-# The limits near the values. A limit far away would flatten the values, which must keep at least
-# about a tenth of the height.
-near_limits <- function(at, value) {
-  if (!any(is.finite(value))) {
-    return(numeric())
+# A limit far away would flatten the values, which must keep at least about a tenth of the height.
+is_near <- function(at, value) {
+  value <- value[is.finite(value)]
+  if (!length(value)) {
+    return(logical(length(at)))
   }
-  seen <- range(value, finite = TRUE)
-  at[at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)]
+  seen <- range(value)
+  at >= seen[[1L]] - 5 * diff(seen) & at <= seen[[2L]] + 5 * diff(seen)
 }

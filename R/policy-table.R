@@ -1,4 +1,4 @@
-#' Act by a table
+#' Make a policy from a table of values
 #'
 #' Make a policy from a table with a row for each observation (a state) and a column for each
 #' action. In each state it takes the action with the largest value, or the first of equal ones.

@@ -48,6 +48,13 @@ row_max <- function(x) {
 }
 best_column <- function(x) if (nrow(x) == 1L) which.max(x) else max.col(x, "first")
 
+# A row for each choice, with 1 in its column.
+one_hot <- function(choice, count) {
+  rows <- matrix(0, length(choice), count)
+  rows[cbind(seq_along(choice), choice)] <- 1
+  rows
+}
+
 # The column of the largest number in each row; of several one is drawn.
 any_best_column <- function(x) {
   column <- max.col(x, "first")

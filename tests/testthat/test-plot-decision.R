@@ -153,7 +153,7 @@ test_that("Taxi has a grid for each passenger and destination", {
   taxi <- fake_environment(observation_space = discrete_space(500L),
                            action_space = discrete_space(6L), id = "Taxi-v4")
   map <- decision_map(taxi, function(state) state %% 4L)
-  data <- state_map_data(map, NULL, NULL, 4, 3)
+  data <- place_states(map$grid, map$env_id, map, NULL, NULL, 4, 3, NULL)
   expect_identical(nrow(data$cells), 25L)
   expect_true(all(data$cells$state %% 4 == 3 & data$cells$state %/% 4 %% 5 == 4))
   expect_match(drawn(autoplot(map))$labels$subtitle, "passenger at Y, destination R")

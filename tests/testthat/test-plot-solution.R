@@ -75,7 +75,7 @@ test_that("an end that costs is a pit, alone it is one where going on gives more
       state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
       reward = c(left, move, move, right)
     ), start = 1)
-    end_kinds(model, state_kinds(model))
+    end_kinds(model)
   }
   expect_identical(ends(0, 1), c("pit", "", "", "goal"))
   expect_identical(ends(-1, -1, move = -1), c("goal", "", "", "goal"))

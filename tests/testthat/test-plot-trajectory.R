@@ -1,5 +1,7 @@
 autoplot <- ggplot2::autoplot
 
+panel_kinds <- function(data) data$values$kind[!duplicated(data$values$panel)]
+
 test_that("the data are those of the table of steps", {
   played <- short_rollout(episodes = 2)
   for (episode in 1:2) {
@@ -14,11 +16,11 @@ test_that("the data are those of the table of steps", {
     expect_identical(data$length, nrow(steps))
   }
   expect_identical(
-    data$panels$panel,
+    levels(data$values$panel),
     c("cart position (m)", "cart velocity (m/s)", "pole angle (rad)",
       "pole angular velocity (rad/s)", "action")
   )
-  expect_identical(data$panels$kind, c(rep("line", 4), "choice"))
+  expect_identical(panel_kinds(data), c(rep("line", 4), "choice"))
 })
 
 test_that("actions have the documented words, also of a function and of doubles", {
@@ -33,16 +35,17 @@ test_that("actions have the documented words, also of a function and of doubles"
 
 test_that("limits are those of the environment, with its panels", {
   limits <- trajectory_plot_data(short_rollout(3))$limits
-  expect_identical(limits$panel, rep(c("cart position (m)", "pole angle (rad)"), each = 2))
+  expect_identical(as.character(limits$panel),
+                   rep(c("cart position (m)", "pole angle (rad)"), each = 2))
   expect_equal(limits$at, c(-2.4, 2.4, -12 * pi / 180, 12 * pi / 180))
   fake <- rollout(fake_environment(), policy_random(), seed = 1, steps = TRUE)
   expect_identical(nrow(trajectory_plot_data(fake)$limits), 0L)
 })
 
 test_that("a limit is near where what happened still fills a tenth of the room", {
-  expect_identical(near_limits(c(-1, 1), c(0, 0.5)), c(-1, 1))
-  expect_identical(near_limits(c(-10, 1), c(0, 0.5)), 1)
-  expect_identical(near_limits(c(-1, 1), c(0, 0.01, NA, Inf)), numeric())
+  expect_identical(is_near(c(-1, 1), c(0, 0.5)), c(TRUE, TRUE))
+  expect_identical(is_near(c(-10, 1), c(0, 0.5)), c(FALSE, TRUE))
+  expect_identical(is_near(c(-1, 1), c(0, 0.01, NA, Inf)), c(FALSE, FALSE))
 })
 
 test_that("the ending is that of the episode", {
@@ -64,14 +67,14 @@ test_that("of many numbers the first are shown, with a message, or those chosen"
   expect_message(data <- trajectory_plot_data(played), "first 8 of 12 numbers of the observation",
                  class = "gym_message_variables") |>
     expect_message("first 6 of 9 numbers of the action")
-  expect_identical(data$panels$panel, c(paste0("obs_", 1:8), "actions"))
-  expect_identical(data$panels$kind[[9]], "line")
+  expect_identical(levels(data$values$panel), c(paste0("obs_", 1:8), "actions"))
+  expect_identical(panel_kinds(data)[[9]], "line")
   expect_identical(unique(data$values$name), c(paste0("obs_", 1:8), paste0("action_", 1:6)))
   expect_null(data$choices)
   suppressMessages(
     chosen <- trajectory_plot_data(played, variables = c("obs_12", "reward"))
   )
-  expect_identical(chosen$panels$panel, c("obs_12", "reward", "actions"))
+  expect_identical(levels(chosen$values$panel), c("obs_12", "reward", "actions"))
   expect_error(trajectory_plot_data(played, variables = "obs_13"), "\"obs_1\", \"obs_2\"",
                class = "gym_error_argument")
 })
@@ -81,15 +84,15 @@ test_that("a Box of one number is named as documented, with its unit", {
   played <- rollout("Pendulum-v1", policy_random(), seed = 1, max_steps = 5, steps = TRUE,
                     client = client)
   data <- trajectory_plot_data(played)
-  expect_identical(data$panels$panel[[4]], "action: torque (N m)")
-  expect_identical(data$panels$kind[[4]], "line")
+  expect_identical(levels(data$values$panel)[[4]], "action: torque (N m)")
+  expect_identical(panel_kinds(data)[[4]], "line")
 })
 
 test_that("parts that are no numbers are left out", {
   played <- rollout(fake_environment(), policy_random(), seed = 1, steps = TRUE)
   played$steps$obs_2 <- letters[seq_len(nrow(played$steps))]
   played$steps$obs_3 <- I(as.list(seq_len(nrow(played$steps))))
-  panels <- trajectory_plot_data(played)$panels$panel
+  panels <- levels(trajectory_plot_data(played)$values$panel)
   expect_identical(panels, c("obs_1", "obs_4", "action"))
 })
 
@@ -139,7 +142,7 @@ test_that("limits are drawn in their own panels, and named in all", {
   played <- short_rollout(100, right)
   limits <- layers_of(drawn(autoplot(played, type = "trajectory")), "GeomHline")[[1]]
   expect_equal(limits$yintercept[limits$PANEL == 3], c(-12, 12) * pi / 180)
-  titles <- panel_titles(trajectory_plot_data(played))
+  titles <- trajectory_plot_data(played)$titles
   expect_identical(titles[["pole angle (rad)"]], "pole angle (rad), fails at \u00b112\u00b0")
 })
 
