@@ -1,7 +1,7 @@
 #' Evaluate a policy with data from another policy
 #'
-#' Estimate the value of a policy from steps that somebody else took: the mean, over the starts of
-#' the data, of the discounted sum of rewards that the policy would get.
+#' Estimate the value of a policy from steps of another policy: the expected discounted return of
+#' the policy, averaged over the first states of the data's episodes.
 #'
 #' # Methods
 #'
@@ -16,23 +16,24 @@
 #' | `"dr"` | the regression, corrected by weighted residuals (doubly robust) | Jiang and Li 2016 |
 #' | `"wdr"` | the same, with weights that add up to 1 at each step | Thomas and Brunskill 2016 |
 #'
-#' Importance sampling needs the probabilities of the actions in the data, and is right if these
-#' are. Fitted Q evaluation needs a right regression. The doubly robust ones need one of the two.
-#' Their regression is fitted to other episodes than those which it corrects (five folds). Where
-#' episodes were cut off, what came after is not known: all methods with weights then need a
-#' `horizon` no longer than the shortest episode that was cut off.
+#' Importance sampling needs the correct probabilities of the actions in the data. Fitted Q
+#' evaluation needs a correct regression. The doubly robust methods need one of the two. Their
+#' regression is fitted without the episodes whose values it predicts (five folds). If episodes were
+#' cut off, the rewards after the cut are unknown: methods with weights then need a `horizon` that
+#' is no longer than the shortest of these episodes.
 #'
-#' No method knows what influenced both actions and rewards and is not in the data (confounding).
+#' All methods are biased if something that is not in the data influenced both actions and rewards
+#' (confounding).
 #'
 #' # Intervals
 #'
-#' Episodes are the unit. The bootstrap draws as many episodes as there are, with replacement,
-#' `replicates` times, and takes the percentiles of the estimates, a little further apart because
-#' episodes are few (the expanded percentile interval, Hesterberg 2015). `"fqe"` fits its
-#' regression again each time, `"wis"` and `"wdr"` normalise their weights, and an estimated model
-#' of behavior is estimated again; `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses
-#' the mean and the standard error over episodes instead, for `"is"`, `"pdis"` and `"dr"` with
-#' known probabilities.
+#' The bootstrap draws as many episodes as there are, with replacement, `replicates` times, and
+#' takes percentiles of the estimates. The interval is widened a little, because percentile
+#' intervals of few episodes are too short (the expanded percentile interval, Hesterberg 2015).
+#' `"fqe"` fits its regression again each time, `"wis"` and `"wdr"` normalise their weights, and an
+#' estimated model of behavior is estimated again; `"dr"` and `"wdr"` keep their regression.
+#' `interval = "t"` uses the mean and the standard error over episodes instead, for `"is"`, `"pdis"`
+#' and `"dr"` with known probabilities.
 #'
 #' @inheritParams learn_fitted_q
 #' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
@@ -125,11 +126,14 @@ evaluate_offline <- function(data, policy, method = c("fqe", "is", "wis", "pdis"
     chosen = chosen, call = call
   )
   check_pairs(design)
-  estimated <- estimate_methods(design, method)
+  prepared <- prepare_methods(design, method)
+  estimates <- estimate_methods(design, method, prepared, matrix(1, steps$episodes, 1L))[1L, ]
   draws <- if (interval == "bootstrap") {
-    with_generator(generator, replicate_methods(design, method, estimated, replicates))
+    with_generator(
+      generator, estimate_methods(design, method, prepared, drawn_counts(design, replicates))
+    )
   }
-  result <- new_offline(design, method, estimated, draws, level)
+  result <- new_offline(design, method, prepared$parts, estimates, draws, level)
   result[c("policy", "folds", "seed", "interval")] <- list(policy, folds, seed, interval)
   if (length(weighted)) warn_few_episodes(result)
   result
@@ -216,21 +220,20 @@ warn_few_episodes <- function(result) {
 
 # Results -------------------------------------------------------------------------------
 
-new_offline <- function(design, method, estimated, draws, level) {
+new_offline <- function(design, method, parts, estimates, draws, level) {
   steps <- design$steps
   tail <- bootstrap_tail(design, level)
-  rows <- lapply(rlang::set_names(method), function(one) {
-    estimate <- estimated$estimates[[one]]
+  rows <- Map(function(one, estimate) {
     if (is.null(draws)) {
-      mean_interval(episode_scores(estimated$parts, one)[, 1L], level)
+      mean_interval(episode_scores(parts, one), level)
     } else {
       ends <- stats::quantile(draws[, one], c(tail, 1 - tail), names = FALSE, type = 6)
       c(estimate, stats::sd(draws[, one]), ends)
     }
-  })
+  }, method, estimates)
   estimates <- data.frame(method = method, do.call(rbind, rows), row.names = NULL)
   names(estimates)[-1L] <- c("estimate", "se", "lower", "upper")
-  weights <- estimated$parts$last
+  weights <- parts$last
   structure(
     list(
       estimates = estimates, observed = observed_value(design, level), weights = weights,
@@ -243,8 +246,8 @@ new_offline <- function(design, method, estimated, draws, level) {
   )
 }
 
-# A bootstrap percentile interval of few episodes is too short: without this it is that of a mean by
-# the normal distribution and a variance divided by n (Hesterberg 2015).
+# A bootstrap percentile interval of few episodes is too short: for a mean it is that of the normal
+# distribution, with a variance divided by n instead of n - 1. This corrects it (Hesterberg 2015).
 bootstrap_tail <- function(design, level) {
   n <- design$steps$episodes
   strata <- length(unique(design$stratum))

@@ -124,7 +124,7 @@ fit_rule <- function(steps, recipe, call) {
         sweep(fit, ahead)
       }
     },
-    function(fit, step) best_next_values(regression, fit, after),
+    function(fit, step) best_values(known_values(fit_values(regression, fit, after))),
     recipe$horizon, recipe$iterations
   )
   new_rule(regression, fits, steps, recipe)
@@ -256,21 +256,23 @@ known_values <- function(q) {
   q
 }
 
-# The value of the best action that was taken in each state; 0 where none was.
-best_next_values <- function(regression, fit, block) {
-  if (is.null(regression$states)) {
-    return(best_values(known_values(fit_values(regression, fit, block))))
-  }
-  # A table has fewer states than there are steps.
-  best <- best_values(known_values(fit_values(regression, fit, seq_len(nrow(regression$states)))))
-  found <- best[block]
-  found[is.na(block)] <- 0
-  found
-}
-
 fit_values <- function(regression, fit, block) {
   if (inherits(fit, "gym_double_fit")) {
     return((regression$values(fit[[1L]], block) + regression$values(fit[[2L]], block)) / 2)
   }
   regression$values(fit, block)
+}
+
+# The values of actions in each row, by the fit of its step: `NA` for a step without one.
+values_by_step <- function(regression, fits, block, step) {
+  values <- fit_values(regression, fits[[1L]], block)
+  for (own in if (length(fits) > 1L) setdiff(step, 1)) {
+    here <- step == own
+    values[here, ] <- if (own > length(fits)) {
+      NA
+    } else {
+      fit_values(regression, fits[[own]], block)[here, ]
+    }
+  }
+  values
 }

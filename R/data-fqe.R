@@ -36,20 +36,6 @@ policy_mean <- function(q, p) {
   rowSums(q * p)
 }
 
-# The values of actions for each step of a block, by the fit of its step.
-values_by_step <- function(regression, fits, block, step, actions) {
-  if (length(fits) == 1L) {
-    q <- regression$values(fits[[1L]], block)
-  } else {
-    q <- matrix(0, length(step), actions)
-    for (own in intersect(seq_along(fits), step)) {
-      q[step == own, ] <- regression$values(fits[[own]], block)[step == own, ]
-    }
-  }
-  q[is.na(q)] <- 0
-  q
-}
-
 # Fitted Q evaluation --------------------------------------------------------------------
 
 # The prepared steps of each stratum, whose rule they value.
@@ -115,7 +101,8 @@ cross_fitted <- function(design) {
     rows <- which(of_step == own)
     fits <- fitting_of(design, own, which(of_step != own))$fit
     block <- design$regression$block(steps$state[rows, , drop = FALSE])
-    q <- values_by_step(design$regression, fits, block, steps$step[rows], nrow(steps$actions))
+    q <- values_by_step(design$regression, fits, block, steps$step[rows])
+    q[is.na(q)] <- 0
     taken[rows] <- q[cbind(seq_along(rows), steps$action[rows])]
     state[rows] <- policy_mean(q, design$act$here[rows, , drop = FALSE])
   }

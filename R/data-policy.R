@@ -142,9 +142,7 @@ one_of_actions <- function(said, n, labels, call) {
   }
   said <- rep_len(said, n)
   check_seen_actions(table(said) / n, labels, call)
-  found <- matrix(0, n, length(labels))
-  found[cbind(seq_len(n), match(said, labels))] <- 1
-  found
+  one_hot(match(said, labels), length(labels))
 }
 
 # The policy's actions must be in the data: nothing is known of others.

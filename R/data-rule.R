@@ -18,20 +18,15 @@ rule_values <- function(policy, states, step = NULL, call = rlang::caller_env())
     }
   }
   block <- policy$regression$block(states)
-  if (length(policy$fits) == 1L) {
-    return(fit_values(policy$regression, policy$fits[[1L]], block))
+  if (length(policy$fits) > 1L) {
+    step <- rep_len(step, nrow(states))
+    wrong <- setdiff(step, seq_along(policy$fits))
+    if (length(wrong)) {
+      must <- paste("a step from 1 to", length(policy$fits))
+      abort_argument(wrong[1L], must, "newdata$step", call)
+    }
   }
-  values <- matrix(NA_real_, nrow(states), nrow(policy$steps$actions))
-  step <- rep_len(step, nrow(states))
-  if (!all(step %in% seq_along(policy$fits))) {
-    must <- paste("a step from 1 to", length(policy$fits))
-    abort_argument(setdiff(step, seq_along(policy$fits))[1L], must, "newdata$step", call)
-  }
-  for (own in unique(step)) {
-    some <- fit_values(policy$regression, policy$fits[[own]], block)
-    values[step == own, ] <- some[step == own, ]
-  }
-  values
+  values_by_step(policy$regression, policy$fits, block, step)
 }
 
 best_known <- function(policy, values) {
@@ -52,11 +47,7 @@ predict_policy.gym_policy_fitted <- function(policy, newdata, type, call = rlang
   best <- best_known(policy, values)
   switch(
     type, action = named_numbers(labelled_space(policy$steps$actions), best - 1L), output = values,
-    probability = {
-      values[] <- 0
-      values[cbind(seq_along(best), best)] <- 1
-      values
-    }
+    probability = `colnames<-`(one_hot(best, ncol(values)), colnames(values))
   )
 }
 

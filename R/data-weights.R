@@ -1,48 +1,51 @@
 # The estimates of `evaluate_offline()` that weight episodes by the ratio of the probabilities of
 # their actions, under the policy and in the data, and their bootstrap.
 
-#' Estimate the value by each method
+#' Prepare the estimates by each method
 #'
 #' @param design What all methods use.
-#' @return A list: `parts`, see [weighted_parts()]; `fitting`, see [prepare_fqe()]; `estimates`, a
-#'   named vector.
+#' @return A list: `parts`, see [weighted_parts()]; `fitting`, see [prepare_fqe()].
 #' @noRd
-estimate_methods <- function(design, method) {
-  once <- matrix(1, design$steps$episodes, 1L)
-  weighted <- setdiff(method, "fqe")
-  parts <- if (length(weighted)) {
-    q <- if (any(c("dr", "wdr") %in% weighted)) cross_fitted(design)
-    weighted_parts(design, q, design$chosen$of(once[, 1L]))
-  }
-  estimates <- if (length(weighted)) weighted_estimates(parts, design$stratum, once, weighted)[1L, ]
-  if (length(weighted) == 1L) names(estimates) <- weighted
-  fitting <- if ("fqe" %in% method) prepare_fqe(design)
-  if (!is.null(fitting)) {
-    estimates <- c(fqe = fitted_value(design, fitting, once[, 1L]), estimates)
-  }
-  list(parts = parts, fitting = fitting, estimates = estimates[method])
+prepare_methods <- function(design, method) {
+  list(
+    parts = if (any(method != "fqe")) {
+      q <- if (any(c("dr", "wdr") %in% method)) cross_fitted(design)
+      weighted_parts(design, q, design$chosen$of(rep(1, design$steps$episodes)))
+    },
+    fitting = if ("fqe" %in% method) prepare_fqe(design)
+  )
 }
 
-replicate_methods <- function(design, method, estimated, replicates) {
-  n <- design$steps$episodes
-  counts <- matrix(0, n, replicates)
-  for (own in split(seq_len(n), design$stratum)) {
-    counts[own, ] <- stats::rmultinom(replicates, length(own), rep(1, length(own)))
-  }
+#' Estimate the value by each method
+#'
+#' @param counts A matrix with a column for each replicate: how often each episode counts.
+#' @return A matrix with a row for each replicate and a column for each method.
+#' @noRd
+estimate_methods <- function(design, method, prepared, counts) {
   weighted <- setdiff(method, "fqe")
-  draws <- if (length(weighted) && !design$chosen$estimated) {
-    weighted_estimates(estimated$parts, design$stratum, counts, weighted)
+  found <- if (length(weighted) && !design$chosen$estimated) {
+    weighted_estimates(prepared$parts, design$stratum, counts, weighted)
   } else if (length(weighted)) {
-    do.call(rbind, lapply(seq_len(replicates), function(i) {
-      parts <- reweighted(estimated$parts, design, design$chosen$of(counts[, i]))
+    # The probabilities are estimated again.
+    do.call(rbind, lapply(seq_len(ncol(counts)), function(i) {
+      parts <- reweighted(prepared$parts, design, design$chosen$of(counts[, i]))
       weighted_estimates(parts, design$stratum, counts[, i, drop = FALSE], weighted)
     }))
   }
   if ("fqe" %in% method) {
-    fqe <- apply(counts, 2L, function(count) fitted_value(design, estimated$fitting, count))
-    draws <- cbind(fqe = fqe, draws)
+    fqe <- apply(counts, 2L, function(count) fitted_value(design, prepared$fitting, count))
+    found <- cbind(fqe = fqe, found)
   }
-  draws[, method, drop = FALSE]
+  found[, method, drop = FALSE]
+}
+
+# How often each episode is drawn in each replicate, as many as there are in each stratum.
+drawn_counts <- function(design, replicates) {
+  counts <- matrix(0, design$steps$episodes, replicates)
+  for (own in split(seq_along(design$stratum), design$stratum)) {
+    counts[own, ] <- stats::rmultinom(replicates, length(own), rep(1, length(own)))
+  }
+  counts
 }
 
 #' Prepare the estimates with weights
@@ -93,42 +96,38 @@ reweighted <- function(parts, design, chosen) {
 #' @return A matrix with a row for each replicate and a column for each method.
 #' @noRd
 weighted_estimates <- function(parts, stratum, counts, methods) {
-  means <- episode_scores(parts, intersect(methods, c("is", "pdis", "dr")))
   n <- nrow(counts)
-  found <- if (length(means)) crossprod(counts, means) / n
-  share <- tabulate(stratum) / n
-  # The mean over strata of what is normalised in each.
-  in_strata <- function(of) {
-    Reduce(`+`, lapply(seq_along(share), function(own) share[[own]] * of(stratum == own)))
-  }
-  ratio <- function(own, x, weight) {
-    over <- crossprod(counts[own, , drop = FALSE], x[own, , drop = FALSE])
-    under <- crossprod(counts[own, , drop = FALSE], weight[own, , drop = FALSE])
-    # Where no episode follows the policy any more nothing is known; only the regression counts.
-    ifelse(under > 0, over / under, 0)
-  }
-  if ("wis" %in% methods) {
-    last <- cbind(parts$last)
-    wis <- in_strata(function(own) ratio(own, last * rowSums(parts$reward), last))
-    found <- cbind(found, wis = drop(wis))
-  }
-  if ("wdr" %in% methods) {
-    wdr <- in_strata(function(own) {
-      rowSums(ratio(own, parts$weight * parts$residual, parts$weight)) +
-        rowSums(ratio(own, parts$before * parts$value, parts$before))
-    })
-    found <- cbind(found, wdr = wdr)
-  }
-  found[, methods, drop = FALSE]
+  each <- lapply(rlang::set_names(methods), function(method) {
+    if (!method %in% c("wis", "wdr")) {
+      return(crossprod(counts, episode_scores(parts, method)) / n)
+    }
+    # The mean over strata of what is normalised in each.
+    Reduce(`+`, lapply(seq_len(max(stratum)), function(one) {
+      own <- stratum == one
+      count <- counts[own, , drop = FALSE]
+      mean(own) * Reduce(`+`, lapply(terms_of(parts, method), function(term) {
+        weight <- term$weight[own, , drop = FALSE]
+        over <- crossprod(count, weight * term$x[own, , drop = FALSE])
+        under <- crossprod(count, weight)
+        # Where no episode follows the policy any more nothing is known; only the regression counts.
+        rowSums(ifelse(under > 0, over / under, 0))
+      }))
+    }))
+  })
+  matrix(unlist(each), ncol = length(methods), dimnames = list(NULL, methods))
 }
 
-# A matrix with a row for each episode and a column for each method that is a mean over episodes.
-episode_scores <- function(parts, methods) {
-  scores <- lapply(rlang::set_names(methods), function(method) {
-    switch(
-      method, is = parts$last * rowSums(parts$reward), pdis = rowSums(parts$weight * parts$reward),
-      dr = rowSums(parts$weight * parts$residual + parts$before * parts$value)
-    )
-  })
-  do.call(cbind, scores)
+# The score of each episode, whose mean is the estimate of a method that does not normalise.
+episode_scores <- function(parts, method) {
+  rowSums(Reduce(`+`, lapply(terms_of(parts, method), function(term) term$weight * term$x)))
+}
+
+# What a method weights: matrices with a row for each episode, and columns that are added up.
+terms_of <- function(parts, method) {
+  term <- function(weight, x) list(weight = cbind(weight), x = cbind(x))
+  switch(
+    method, is = , wis = list(term(parts$last, rowSums(parts$reward))),
+    pdis = list(term(parts$weight, parts$reward)),
+    dr = , wdr = list(term(parts$weight, parts$residual), term(parts$before, parts$value))
+  )
 }
