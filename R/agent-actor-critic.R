@@ -34,7 +34,6 @@
 #' predict(learned, 1:2, type = "output")
 agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate = 0.1,
                                initial = 0, features = NULL, lambda = 0, actor_lambda = 0) {
-  check_schedule(actor_rate, "actor_rate", 0, 1, rlang::current_env())
   check_number(lambda, min = 0, max = 1)
   check_number(actor_lambda, min = 0, max = 1)
   settings <- list(
@@ -42,8 +41,9 @@ agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate 
     temperature = 1, initial = initial, features = features, lambda = lambda,
     actor_lambda = actor_lambda
   )
+  check_schedules(settings, "actor_rate", max = 1)
   check_learner(settings)
-  new_learner("gym_agent_actor_critic", settings)
+  new_learner("actor_critic", settings)
 }
 
 #' @export

@@ -66,14 +66,11 @@ agent_ars <- function(directions = 8, top = max(1, directions %/% 2), step_size 
   check_above_zero(step_size)
   check_above_zero(noise)
   check_number(shift)
-  structure(
-    list(
-      directions = as.integer(directions),
-      top = if (endsWith(version, "-t")) as.integer(top) else as.integer(directions),
-      step_size = step_size, noise = noise, version = version, shift = shift, policy = NULL
-    ),
-    class = c("gym_agent_ars", "gym_agent")
-  )
+  new_agent("ars", list(
+    directions = as.integer(directions),
+    top = if (endsWith(version, "-t")) as.integer(top) else as.integer(directions),
+    step_size = step_size, noise = noise, version = version, shift = shift, policy = NULL
+  ))
 }
 
 #' @export

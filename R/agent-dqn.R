@@ -67,9 +67,9 @@ agent_dqn <- function(memory = 50000, learning_starts = 1000, batch = 64, update
   check_count(learning_starts, min = 0)
   check_count(batch, max = memory)
   check_above_zero(updates_per_step)
-  check_scheduled(settings, "learning_rate")
+  check_schedules(settings, "learning_rate")
   check_number(gamma, min = 0, max = 1)
-  check_schedule(epsilon, "epsilon", 0, 1, rlang::current_env())
+  check_schedules(settings, "epsilon", max = 1)
   check_flag(double)
   check_count(target_every)
   check_number(target_rate, min = 0, max = 1, allow_null = TRUE)
@@ -145,7 +145,7 @@ learn_from_memory <- function(agent, memory, updates, steps, settings) {
   policy <- agent$policy
   state <- list(weights = weight_vector(policy), target = agent$target, adam = agent$adam)
   kept <- min(memory$count, agent$memory_size)
-  # The steps of the iteration at which each update comes, and which of them renew the target.
+  # The step at which each update takes place, and whether the update renews the target network.
   at <- agent$steps + steps * seq_len(updates) / max(updates, 1)
   period <- floor(c(agent$steps, at) / agent$target_every)
   renews <- is.null(agent$target_rate) & diff(period) > 0
@@ -179,10 +179,10 @@ learn_from_memory <- function(agent, memory, updates, steps, settings) {
 #' @noRd
 dqn_update <- function(policy, state, rows, settings) {
   n <- length(rows$reward)
-  values_after <- forward_network(policy, state$target, rows$next_inputs)$outputs
+  values_after <- forward_network(layers_of(policy, state$target), rows$next_inputs)$outputs
   layers <- layers_of(policy, state$weights)
   best <- if (settings$double) {
-    own <- forward_layers(layers, policy$activation, rows$next_inputs)$outputs
+    own <- forward_network(layers, rows$next_inputs)$outputs
     values_after[places_of_actions(nrow(own), max.col(t(own), "first"))]
   } else {
     column_max(values_after)
@@ -190,7 +190,7 @@ dqn_update <- function(policy, state, rows, settings) {
   best[rows$terminated] <- 0
   wanted <- rows$reward + settings$gamma * best
 
-  forward <- forward_layers(layers, policy$activation, rows$inputs)
+  forward <- forward_network(layers, rows$inputs)
   outputs <- forward$outputs
   taken <- places_of_actions(nrow(outputs), rows$action)
   error <- outputs[taken] - wanted
@@ -207,14 +207,14 @@ dqn_update <- function(policy, state, rows, settings) {
 
 # The memory ---------------------------------------------------------------------------------
 
-# Make an empty memory: `size`, the largest number of steps, of which the oldest are overwritten;
-# `count`, the number of all steps so far; `steps`, a matrix with the numbers of a step in each
+# Makes an empty memory: `size` is the largest number of steps, beyond which the oldest are
+# overwritten; `count` is the number of all steps so far; `steps` is a matrix with a step in each
 # column.
 new_memory <- function(size) {
   structure(list(size = size, count = 0, steps = NULL), class = "gym_memory")
 }
 
-# Add a matrix with a step in each column.
+# Adds a matrix with a step in each column.
 add_to_memory <- function(memory, new) {
   n <- ncol(new)
   # If there are more than fit, only the last ones.
@@ -244,7 +244,7 @@ recalled <- function(memory, policy, at) {
   steps <- memory$steps[, at, drop = FALSE]
   width <- (nrow(steps) - 3L) %/% 2L
   own <- seq_len(width)
-  seen <- function(rows) network_columns(policy, t(steps[rows, , drop = FALSE]))
+  seen <- function(rows) t(network_inputs(policy, t(steps[rows, , drop = FALSE])))
   list(
     inputs = seen(own), next_inputs = seen(width + own),
     action = as.integer(steps[2L * width + 1L, ]), reward = steps[2L * width + 2L, ],

@@ -2,13 +2,11 @@
 # moments of observations, and the steps of an iteration as rows.
 
 new_gradient_agent <- function(class, settings, log) {
-  structure(
-    c(settings, list(
-      log = rlang::rep_named(log, NA_real_), policy = NULL, iteration = 0L, steps = 0,
-      episodes = settings$min_episodes
-    )),
-    class = c(paste0("gym_agent_", class), "gym_agent_gradient", "gym_agent")
-  )
+  settings <- c(settings, list(
+    log = rlang::rep_named(log, NA_real_), policy = NULL, iteration = 0L, steps = 0,
+    episodes = settings$min_episodes
+  ))
+  new_agent(class, settings, "gym_agent_gradient")
 }
 
 #' @export
@@ -38,6 +36,10 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
 
 #' @export
 agent_needs.gym_agent_gradient <- function(agent) c("returns", "trajectories")
+
+# The policy is played as it is, so its weights need not be asked for.
+#' @export
+agent_ask.gym_agent_gradient <- function(agent) NULL
 
 #' @export
 agent_episodes.gym_agent_gradient <- function(agent, episodes) agent$episodes
@@ -74,8 +76,8 @@ iteration_rows <- function(policy, trajectories) {
   observations <- number_rows(trajectories$observation)
   after <- number_rows(trajectories$next_observation)
   list(
-    inputs = network_columns(policy, observations),
-    last_inputs = network_columns(policy, after[last, , drop = FALSE]),
+    inputs = t(network_inputs(policy, observations)),
+    last_inputs = t(network_inputs(policy, after[last, , drop = FALSE])),
     observations = observations, action = network_actions(policy, trajectories$action),
     reward = trajectories$reward, terminated = trajectories$terminated, last = last
   )
@@ -134,7 +136,7 @@ value_network <- function(policy) {
 }
 
 expected_values <- function(value, inputs) {
-  forward_network(value, weight_vector(value), inputs)$outputs[1L, ]
+  forward_network(layers_of(value), inputs)$outputs[1L, ]
 }
 
 #' Cut rows into minibatches of nearly equal size, in a random order
@@ -154,14 +156,6 @@ agent_log.gym_agent_gradient <- function(agent) agent$log
 scheduled_settings <- function(agent, names) {
   for (name in names) agent[[name]] <- scheduled(agent[[name]], agent$steps, name, max = Inf)
   agent
-}
-
-check_scheduled <- function(settings, names, call = rlang::caller_env()) {
-  for (name in names) {
-    rate <- endsWith(name, "learning_rate")
-    max <- if (rate) .Machine$double.xmax else Inf
-    check_schedule(settings[[name]], name, 0, max, call, above_zero = rate)
-  }
 }
 
 # An agent that follows the gradient of log-probabilities needs a policy that has them.

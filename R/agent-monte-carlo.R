@@ -71,7 +71,7 @@ agent_monte_carlo <- function(discount = 0.99, epsilon = 0.1, temperature = NULL
     learns = target_policy
   )
   check_learner(settings[!vapply(settings, is.null, NA)])
-  new_learner("gym_agent_monte_carlo", settings)
+  new_learner("monte_carlo", settings)
 }
 
 #' @export

@@ -94,7 +94,7 @@ agent_ppo <- function(batch_steps = 2048, batch = 64, epochs = 10, learning_rate
     abort_argument(batch, must, "batch", rlang::current_env())
   }
   check_count(epochs)
-  check_scheduled(settings, c("learning_rate", "clip", "entropy"))
+  check_schedules(settings, c("learning_rate", "clip", "entropy"))
   for (name in c("gamma", "lambda")) check_number(settings[[name]], min = 0, max = 1, arg = name)
   check_number(value_weight, min = 0)
   check_number(max_grad_norm, min = 0)
@@ -207,7 +207,7 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   n <- length(batch$return)
   of_policy <- forward_draws(policy, weights, batch$inputs, batch$action)
   draws <- of_policy$draws
-  of_value <- forward_network(value, weights, batch$inputs, start = count_weights(policy))
+  of_value <- forward_network(layers_of(value, weights, count_weights(policy)), batch$inputs)
   advantage <- batch$advantage
   if (settings$normalize_advantages) advantage <- standardized(advantage)
 

@@ -88,7 +88,7 @@ agent_q <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tempera
     planning > 0 && (double || !is.null(features)), "planning", planning, rlang::current_env(),
     "`planning` is for a single table, not for features or double Q-learning."
   )
-  new_learner("gym_agent_q", settings)
+  new_learner("q", settings)
 }
 
 #' @export

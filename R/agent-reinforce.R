@@ -58,7 +58,7 @@ agent_reinforce <- function(batch_steps = 1000, learning_rate = 0.01, gamma = 0.
   settings <- mget(names(formals()))
   check_count(batch_steps)
   check_count(min_episodes)
-  check_scheduled(settings, c("learning_rate", "value_learning_rate", "entropy"))
+  check_schedules(settings, c("learning_rate", "value_learning_rate", "entropy"))
   check_number(gamma, min = 0, max = 1)
   check_flag(baseline)
   check_count(value_updates)
@@ -121,7 +121,7 @@ agent_tell.gym_agent_reinforce <- function(agent, results) {
     # Steps down the gradient of the squared error.
     weights <- weight_vector(agent$value)
     for (update in seq_len(agent$value_updates)) {
-      forward <- forward_network(agent$value, weights, rows$inputs)
+      forward <- forward_network(layers_of(agent$value, weights), rows$inputs)
       gradient <- backward_network(forward, 2 / n * (forward$outputs - return))
       moved <- adam_step(weights, gradient, agent$value_adam, now$value_learning_rate)
       weights <- moved$weights

@@ -37,7 +37,7 @@ agent_sarsa <- function(discount = 0.99, learning_rate = 0.1, epsilon = 0.1, tem
   settings$n <- as.integer(n)
   check_learner(settings)
   check_one_horizon(n, lambda)
-  new_learner("gym_agent_sarsa", settings)
+  new_learner("sarsa", settings)
 }
 
 check_one_horizon <- function(n, lambda, call = rlang::caller_env()) {

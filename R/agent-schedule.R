@@ -58,13 +58,18 @@ print.gym_schedule <- function(x, ...) {
 # Below this, a softmax takes the best action.
 lowest_temperature <- 1e-12
 
-check_schedule <- function(x, arg, min, max, call, above_zero = FALSE) {
-  if (!is.function(x) && !(is_number(x) && x >= min && x <= max && (x > 0 || !above_zero))) {
-    range <- range_text(min, max)
-    # A learner with a rate of 0 would learn nothing.
-    if (above_zero) range <- paste0(" above 0", if (max == 1) " and at most 1")
-    must <- paste0("a number", range, ", or a function of the steps so far")
-    abort_argument(x, must, arg, call)
+check_schedules <- function(settings, names, min = 0, max = Inf, call = rlang::caller_env()) {
+  for (name in names) {
+    x <- settings[[name]]
+    # An agent with a learning rate of 0 would learn nothing.
+    is_rate <- endsWith(name, "learning_rate")
+    fits <- is_number(x) && x >= min && x <= max && !(is_rate && x %in% c(0, Inf))
+    if (!is.function(x) && !fits) {
+      range <- range_text(min, max)
+      if (is_rate) range <- paste0(" above 0", if (max == 1) " and at most 1")
+      must <- paste0("a number", range, ", or a function of the steps so far")
+      abort_argument(x, must, name, call)
+    }
   }
 }
 

@@ -20,13 +20,10 @@
 #' train_agent(agent_random(), "CartPole-v1", policy_network(), iterations = 10, seed = 1)
 agent_random <- function(candidates = 8) {
   check_count(candidates)
-  structure(
-    list(
-      candidates = as.integer(candidates), played = 0L, best = NA_integer_, best_return = -Inf,
-      policy = NULL
-    ),
-    class = c("gym_agent_random", "gym_agent")
-  )
+  new_agent("random", list(
+    candidates = as.integer(candidates), played = 0L, best = NA_integer_, best_return = -Inf,
+    policy = NULL
+  ))
 }
 
 #' @export
@@ -202,12 +199,9 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
 agent_hill_climb <- function(noise = 0.1, candidates = 1) {
   check_above_zero(noise)
   check_count(candidates)
-  structure(
-    list(
-      noise = noise, candidates = as.integer(candidates), best_return = -Inf, policy = NULL
-    ),
-    class = c("gym_agent_hill_climb", "gym_agent")
-  )
+  new_agent("hill_climb", list(
+    noise = noise, candidates = as.integer(candidates), best_return = -Inf, policy = NULL
+  ))
 }
 
 #' @export
@@ -287,14 +281,11 @@ agent_cem <- function(population = 40, elite = max(1, population %/% 5), noise =
   check_above_zero(noise)
   check_number(extra_noise, min = 0)
   check_count(extra_iterations)
-  structure(
-    list(
-      population = as.integer(population), elite = as.integer(elite), noise = noise,
-      extra_noise = extra_noise, extra_iterations = as.integer(extra_iterations), iteration = 0L,
-      deviation = NULL, policy = NULL
-    ),
-    class = c("gym_agent_cem", "gym_agent")
-  )
+  new_agent("cem", list(
+    population = as.integer(population), elite = as.integer(elite), noise = noise,
+    extra_noise = extra_noise, extra_iterations = as.integer(extra_iterations), iteration = 0L,
+    deviation = NULL, policy = NULL
+  ))
 }
 
 #' @export

@@ -56,7 +56,7 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   )
   check_learner(settings)
   check_one_horizon(n, lambda)
-  new_learner("gym_agent_td", settings)
+  new_learner("td", settings)
 }
 
 #' @export

@@ -10,16 +10,15 @@
 #'   observed.
 #' @noRd
 new_learner <- function(class, settings) {
-  structure(settings, class = c(class, "gym_value_learner", "gym_learner", "gym_agent"))
+  new_agent(class, settings, c("gym_value_learner", "gym_learner"))
 }
 
 check_learner <- function(settings, call = rlang::caller_env()) {
   check_discount(settings$discount, "discount", call)
-  for (name in intersect(c("learning_rate", "epsilon"), names(settings))) {
-    check_schedule(settings[[name]], name, 0, 1, call, above_zero = name == "learning_rate")
-  }
+  given <- names(settings)
+  check_schedules(settings, intersect(c("learning_rate", "epsilon"), given), max = 1, call = call)
   if (!is.null(settings$temperature)) {
-    check_schedule(settings$temperature, "temperature", lowest_temperature, Inf, call)
+    check_schedules(settings, "temperature", min = lowest_temperature, call = call)
   }
   if (is.null(settings$temperature) && !isTRUE(settings$exploring_starts)) {
     check_explores(settings$epsilon, call)
@@ -241,7 +240,7 @@ action_chooser <- function(agent, draw) {
       actions[values == best]
     }
     count <- length(from)
-    # As draw_place() where all weigh the same, and twice as fast.
+    # Like draw_place() with equal weights, but twice as fast.
     if (count == 1L) from else from[[as.integer(draw() * count) + 1L]]
   }
 }

@@ -21,9 +21,7 @@
 #' @examplesIf gym:::can_start_server()
 #' rollout("CartPole-v1", candidates, episodes = 5, seed = 1)
 policy_candidates <- function(policy, weights) {
-  if (!inherits(policy, "gym_policy_network")) {
-    abort_no_weights(policy, "policy", rlang::current_env())
-  }
+  check_is_network(policy)
   check_network(policy)
   weights <- plain_numbers(weights)
   call <- rlang::current_env()

@@ -30,7 +30,8 @@
 #'   policy as `agent$policy`.
 #' * `agent_ask()`: the candidates to play next, a numeric matrix with the weights of a candidate in
 #'   each row, in the order of [coef()][coef.gym_policy_network]. Attributes of the matrix come back
-#'   with the results. The method of `"gym_agent"` returns the weights of `agent_behavior()`.
+#'   with the results. The method of `"gym_agent"` returns the weights of `agent_behavior()`. With
+#'   `NULL` that policy is played as it is.
 #' * `agent_tell()`: the updated agent. The method of `"gym_agent"` merges the moments of the
 #'   observations into those of `agent$policy`. Begin a method with `agent <- NextMethod()` if
 #'   observations may be normalised.
@@ -134,6 +135,11 @@ default_policy <- function(agent) UseMethod("default_policy")
 
 #' @exportS3Method
 default_policy.gym_agent <- function(agent) policy_linear()
+
+# Makes an agent of this package. `shared` are the classes of what it shares with others.
+new_agent <- function(class, settings, shared = NULL) {
+  structure(settings, class = c(paste0("gym_agent_", class), shared, "gym_agent"))
+}
 
 #' @export
 print.gym_agent <- function(x, ...) print_lines(x, paste0("<agent: ", format(x), ">"))

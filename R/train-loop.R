@@ -110,9 +110,12 @@ train_iteration <- function(state, vector_env, settings, call) {
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
 
-# The weights of the candidates, a row for each.
+# The weights of the candidates, a row for each. `NULL` if the behavior policy itself is played.
 asked_weights <- function(state, agent, count, call) {
   asked <- with_generator(state$streams$agent, agent_ask(agent))
+  if (is.null(asked)) {
+    return(NULL)
+  }
   asked <- plain_numbers(asked, "agent_ask()", call)
   if (!is.matrix(asked) || !is.numeric(asked) || ncol(asked) != count || !nrow(asked)) {
     must <- paste("a numeric matrix with", count_of(count, "column"))
