@@ -139,7 +139,7 @@ wrappers_around <- function(x) x$wrappers %||% x$provenance$wrappers
 #' @noRd
 env_names <- function(results) {
   ids <- vapply(results, function(x) x$env_id, "")
-  texts <- split(vapply(results, env_text, ""), factor(ids, unique(ids)))
+  texts <- split_in_order(vapply(results, env_text, ""), ids)
   vapply(texts, function(of_one) toString(unique(of_one)), "")
 }
 

@@ -87,7 +87,7 @@ comparison_plot_data <- function(rollouts) {
   each <- Map(candidate_returns, rollouts, names(rollouts), length(rollouts) > 1L)
   ids <- rep(vapply(rollouts, function(x) x$env_id, ""), lengths(each))
   groups <- unlist(unname(each), recursive = FALSE)
-  by_env <- lapply(split(groups, factor(ids, unique(ids))), function(groups) {
+  by_env <- lapply(split_in_order(groups, ids), function(groups) {
     highest <- order(-vapply(groups, mean, 0))[seq_len(most_rows)]
     if (length(groups) <= most_rows) groups else groups[highest]
   })

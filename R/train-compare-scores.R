@@ -24,7 +24,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
     )
     runs$score <- (runs$score - reference$low[at]) / span
   }
-  scores <- lapply(split(runs, factor(runs$training, unique(runs$training))), function(own) {
+  scores <- lapply(split_in_order(runs, runs$training), function(own) {
     split(own$score, factor(own$env_id, ids, exclude = NULL))
   })
   generator <- new_generator(settings$seed)
@@ -49,8 +49,7 @@ run_scores <- function(trainings, curves, steps, call) {
     vapply(ended, function(one) paste(label, one$env_id, one$seed), "")
   }, trainings, names(trainings)))
   curves <- curves[!paste(curves$training, curves$env_id, curves$seed) %in% cut_short, ]
-  key <- paste(curves$training, curves$env_id, curves$seed)
-  of_run <- split(curves, factor(key, unique(key)))
+  of_run <- split_in_order(curves, curves$training, curves$env_id, curves$seed)
   if (!length(of_run)) {
     abort_wrong("...", NULL, call, "There is nothing to compare: no policy was evaluated.")
   }

@@ -206,7 +206,7 @@ print.gym_comparison <- function(x, ...) print_lines(x, comparison_lines(x))
 steps_taken_line <- function(runs) {
   of_few <- length(unique(runs$training)) <= 4L
   taken <- if (of_few) {
-    split(runs$steps, factor(runs$training, unique(runs$training)))
+    split_in_order(runs$steps, runs$training)
   } else {
     list(runs$steps)
   }
@@ -241,7 +241,7 @@ comparison_lines <- function(x, pairs = TRUE) {
     paste0(text(value), " [", text(lower), ", ", text(upper), "]")
   }
   shown <- if (scores) {
-    each <- split(table, factor(table$statistic, unique(table$statistic)))
+    each <- split_in_order(table, table$statistic)
     columns <- lapply(each, function(rows) interval(rows$value, rows$lower, rows$upper))
     data.frame(columns, row.names = unique(table$training))
   } else {
@@ -299,8 +299,7 @@ compare_by_steps <- function(trainings, level, call) {
   if (!nrow(runs)) {
     abort_wrong("...", NULL, call, "There is nothing to compare: all runs were interrupted.")
   }
-  key <- paste(runs$training, runs$env_id, sep = "\r")
-  profiles <- lapply(split(runs, factor(key, unique(key))), reached_profile, level)
+  profiles <- lapply(split_in_order(runs, runs$training, runs$env_id), reached_profile, level)
   list(
     by = "steps", table = do.call(rbind, unname(lapply(profiles, attr, "summary"))), runs = runs,
     profile = do.call(rbind, unname(profiles)), notes = notes

@@ -65,8 +65,8 @@ curves_of <- function(trainings, call) {
 
 # All runs at the same numbers of steps.
 curves_at <- function(table, at) {
-  run <- paste(table$training, table$env_id, table$seed, sep = "\r")
-  each <- lapply(split(table, factor(run, unique(run))), function(own) {
+  runs <- split_in_order(table, table$training, table$env_id, table$seed)
+  each <- lapply(runs, function(own) {
     return <- returns_at(own, at)
     return[at < min(own$steps)] <- NA
     of_one <- no_curve[rep(NA_integer_, length(at)), ]
@@ -77,8 +77,8 @@ curves_at <- function(table, at) {
   do.call(rbind, c(list(table[0L, ]), unname(each)))
 }
 
-# Between two evaluations the return is interpolated, beyond them the nearest counts. Of several at
-# one place the last counts, which had the most episodes.
+# Interpolates the return between two evaluations. Before the first and after the last it stays the
+# same. Of several evaluations at one step the last counts, because it had the most episodes.
 returns_at <- function(curve, at) {
   curve <- curve[!duplicated(curve$steps, fromLast = TRUE), ]
   if (nrow(curve) == 1L) {
@@ -186,8 +186,8 @@ folder_curves <- function(path, call) {
   do.call(rbind, read_logs(setdiff(below, files), call))
 }
 
-# The rows of a file, `NULL` if it is no log; of Monitor's its episodes. The first line identifies
-# the kind of file.
+# The rows of a log file, or the episodes of a file of Monitor. `NULL` if the file is no log. The
+# first line identifies the kind of file.
 file_table <- function(file) {
   opened <- gzfile(file, "rb")
   # Files of saveRDS() contain zeros.
@@ -234,7 +234,7 @@ monitor_episodes <- function(lines) {
 
 has_episodes <- function(table) "session" %in% names(table)
 
-# Parallel environments have a file each. Within a file episodes stay in their order.
+# Each of the parallel environments has its own file. Episodes of a file stay in their order.
 monitor_curves <- function(episodes, path) {
   episodes <- episodes[order(episodes$session, episodes$time), ]
   rows <- data.frame(
@@ -285,7 +285,7 @@ run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
     seed <- seed %||% sub(".*seed[-_=]?([0-9]+).*", "\\1", name)
   }
   rows[c("steps", "mean_return")] <- lapply(rows[c("steps", "mean_return")], log_numbers)
-  # Rows of other numbers have none, and a line that was being written at a crash.
+  # A row that logs other values lacks these, and so does a line that a crash has cut off.
   rows <- rows[!is.na(rows$steps) & !is.na(rows$mean_return), ]
   missing <- setdiff(names(no_curve), names(rows))
   rows[missing] <- lapply(no_curve[missing], function(none) rep(none[NA_integer_], nrow(rows)))

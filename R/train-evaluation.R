@@ -1,8 +1,8 @@
 # When training ends, and the evaluations of the agent's own policy.
 
-# Seeds of episodes: training uses those up to this number, evaluations those above it, of which the
-# final evaluation has the upper half. So an evaluation plays no episode of the training, and the
-# final one none of any other.
+# Training uses the seeds of episodes up to this number, and evaluations use those above it. The
+# upper half of these is for the final evaluation. So no evaluation plays an episode of the
+# training, and the final evaluation plays no episode of another evaluation.
 last_training_seed <- 2^30
 
 draw_training_seeds <- function(n) sample.int(last_training_seed, n, replace = TRUE)
@@ -46,9 +46,9 @@ training_ends <- function(state, vector_env, settings) {
   state$solved
 }
 
-# An iteration of DQN is a single episode, and one that was lucky does not justify an evaluation of
-# 100. An agent that gets trajectories is therefore judged by its last iterations with at least this
-# many episodes, the fewest that PPO plays in one.
+# An iteration of DQN is a single episode, and one lucky episode does not justify an evaluation with
+# 100. An agent that gets trajectories is therefore judged by its last iterations that have at least
+# this many episodes together, the smallest number that PPO plays in an iteration.
 enough_episodes <- 8L
 
 recent_return <- function(state) {
@@ -113,9 +113,9 @@ judged_policy <- function(settings, agent) {
 
 play_evaluation <- function(state, vector_env, settings, policy, episodes, final) {
   if (!is.null(vector_env$make_evaluated)) vector_env <- vector_env$make_evaluated()
-  # The final evaluation draws from copies: a training resumed with a larger budget then evaluates
-  # like one that had it from the start. So does the first evaluation, so that it does not change
-  # later ones.
+  # The final evaluation draws from a copy of the streams: a training that is resumed with a larger
+  # budget then evaluates like one that had it from the start. The first evaluation also draws from
+  # a copy, so that it does not change later ones.
   streams <- state$evaluation_streams
   if (final || !state$iteration) streams <- restore_streams(saved_streams(streams))
   half <- last_training_seed / 2

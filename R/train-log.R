@@ -8,9 +8,9 @@ log_columns <- c(
   "rollout/ep_len_mean", "eval/mean_reward", "eval/mean_ep_length"
 )
 
-# The table's lines for these iterations; the first line has the column names.
-log_lines <- function(state, iterations) {
-  rows <- rows_table(state$history[iterations], no_iterations)
+# The table's lines from this iteration on. The first line has the column names.
+log_lines <- function(state, from) {
+  rows <- rows_table(state$history[seq_along(state$history) >= from], no_iterations)
   evaluations <- rows_table(state$evaluations, no_evaluations)
   # Of several evaluations in an iteration, the last counts, which had the most episodes.
   evaluations <- evaluations[!duplicated(evaluations$iteration, fromLast = TRUE), ]
@@ -32,9 +32,9 @@ log_lines <- function(state, iterations) {
 }
 
 # A row for each evaluation from this one on.
-evaluation_lines <- function(state, from = 1L) {
+evaluation_lines <- function(state, from) {
   history <- rows_table(state$history, no_iterations)
-  rows <- rows_table(state$evaluations[seq_len(length(state$evaluations)) >= from], no_evaluations)
+  rows <- rows_table(state$evaluations[seq_along(state$evaluations) >= from], no_evaluations)
   steps <- evaluation_steps(list(history = history, evaluations = rows))
   names(rows)[names(rows) == "steps"] <- "eval_steps"
   csv_lines(cbind(rows["iteration"], steps = steps, rows[-1L]))
@@ -51,17 +51,29 @@ csv_lines <- function(table) {
 
 #' Prepare to log a training
 #'
-#' The table is written completely when training begins or resumes, so that it agrees with the
+#' Both tables are written completely when training begins or resumes, so that they agree with the
 #' history, and after a line could not be written. Otherwise lines are appended.
 #' @param state The training as it begins or resumes.
 #' @return A function that is called after each iteration.
 #' @noRd
 training_log <- function(folder, settings, state, call) {
-  table <- file.path(folder, "progress.csv")
-  evaluations <- file.path(folder, "evaluations.csv")
-  write_all <- function() {
-    replace_content(table, as_lines(log_lines(state, seq_len(state$iteration))))
-    replace_content(evaluations, as_lines(evaluation_lines(state)))
+  tables <- file.path(folder, c("progress.csv", "evaluations.csv"))
+  # The numbers of iterations and of evaluations in the tables. With `NULL` they are written anew.
+  written <- NULL
+  write <- function() {
+    before <- written
+    written <<- NULL
+    rows <- c(state$iteration, length(state$evaluations))
+    first <- (before %||% c(0L, 0L)) + 1L
+    lines <- list(log_lines(state, first[[1L]]), evaluation_lines(state, first[[2L]]))
+    for (i in 1:2) {
+      if (is.null(before)) {
+        replace_content(tables[[i]], as_lines(lines[[i]]))
+      } else if (rows[[i]] >= first[[i]]) {
+        write_bytes(tables[[i]], as_lines(lines[[i]][-1L]), "ab")
+      }
+    }
+    written <<- rows
   }
   fail <- function(cnd) {
     abort_wrong(
@@ -74,37 +86,21 @@ training_log <- function(folder, settings, state, call) {
       dir.create(folder, showWarnings = FALSE, recursive = TRUE)
       write_config(file.path(folder, "config.json"), settings)
       # Tables that exist when a training begins belong to another one.
-      if (state$iteration == 0L) for (file in c(table, evaluations)) keep_as_earlier(file)
-      write_all()
+      if (state$iteration == 0L) for (file in tables) keep_as_earlier(file)
+      write()
     },
     error = fail, warning = fail
   )
-  logged <- state$iteration
-  evaluated <- length(state$evaluations)
-  whole <- TRUE
   failed <- FALSE
   function() {
-    new <- log_lines(state, seq_len(state$iteration - logged) + logged)[-1L]
-    new_evaluations <- evaluation_lines(state, evaluated + 1L)[-1L]
-    logged <<- state$iteration
-    evaluated <<- length(state$evaluations)
     # Do not stop a long training because the disk is full.
     tryCatch(
-      {
-        if (whole) {
-          append_lines(table, new)
-          append_lines(evaluations, new_evaluations)
-        } else {
-          write_all()
-        }
-        whole <<- TRUE
-      },
+      write(),
       error = function(cnd) {
-        whole <<- FALSE
         if (!failed) {
           rlang::warn(
-            c(paste0("The log \"", table, "\" cannot be written; the training continues without ",
-                     "it."), x = conditionMessage(cnd)),
+            c(paste0("The log \"", tables[[1L]], "\" cannot be written; the training continues ",
+                     "without it."), x = conditionMessage(cnd)),
             class = "gym_warning_log"
           )
         }
@@ -112,10 +108,6 @@ training_log <- function(folder, settings, state, call) {
       }
     )
   }
-}
-
-append_lines <- function(table, lines) {
-  if (length(lines)) write_bytes(table, as_lines(lines), "ab")
 }
 
 write_config <- function(file, settings) {

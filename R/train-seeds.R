@@ -104,15 +104,14 @@ seeds_go_to_workers <- function(vector_env, settings) {
     return(FALSE)
   }
   recipe <- training_recipe(vector_env, settings)
-  if (!is.list(recipe)) {
-    inform_plays_here(recipe)
+  # A recipe that is no list says why there is none.
+  obstacle <- if (!is.list(recipe)) {
+    recipe
   } else if (refers_to_process(settings[c("agent", "policy", "callback")])) {
-    inform_plays_here("agent, policy or callback has a connection or a pointer")
-  } else {
-    inform_of_servers()
-    return(TRUE)
+    "agent, policy or callback has a connection or a pointer"
   }
-  FALSE
+  if (!is.null(obstacle)) inform_plays_here(obstacle)
+  is.null(obstacle)
 }
 
 # An environment that remembers something over episodes does so on the worker, too, which plays a
@@ -120,39 +119,6 @@ seeds_go_to_workers <- function(vector_env, settings) {
 training_recipe <- function(vector_env, settings) {
   vector_env$remembers <- NULL
   environment_recipe(settings$played$env, vector_env, settings$played$kwargs %||% list())
-}
-
-# If parallel trainings have their own workers on this machine, too.
-inform_of_servers <- function() {
-  plans <- future::plan("list")
-  if (length(plans) < 2L || !inherits(plans[[1L]], c("multisession", "multicore"))) {
-    return(invisible())
-  }
-  workers <- vapply(plans[1:2], workers_of_plan, 0)
-  cores <- parallel::detectCores()
-  if (all(is.finite(workers)) && isTRUE(prod(workers) > cores)) {
-    cli::cli_inform(
-      c(i = "The nested plans start up to {prod(workers)} servers on a machine of {cores} core{?s}:
-             {workers[[1L]]} trainings with {workers[[2L]]} workers each."),
-      class = "gym_message_servers"
-    )
-  }
-}
-
-# The number of workers of a plan, also of one that is not in use. future would start that plan to
-# answer, which ends the workers of the current one. `NA` if it is unknown.
-workers_of_plan <- function(plan) {
-  if (inherits(plan, "sequential")) {
-    return(1)
-  }
-  workers <- tryCatch(
-    {
-      workers <- eval(formals(plan)$workers, list(), environment(plan))
-      if (is.function(workers)) workers() else workers
-    },
-    error = function(cnd) NULL
-  )
-  as.numeric(if (is.null(workers)) NA else if (is.numeric(workers)) workers else length(workers))
 }
 
 # A future for each seed. Results are kept in the order of the seeds.

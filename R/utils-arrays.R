@@ -20,6 +20,12 @@ array_shape <- function(x) dim(x) %||% length(x)
 
 shape_text <- function(shape) paste0("[", paste(shape, collapse = ", "), "]")
 
+# Like split(), with groups in the order in which they come. They may have several keys.
+split_in_order <- function(x, ...) {
+  key <- paste(..., sep = "\r")
+  split(x, factor(key, unique(key)))
+}
+
 # Rows ------------------------------------------------------------------------------------
 
 softmax_rows <- function(values, temperature = 1) {

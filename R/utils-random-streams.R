@@ -78,10 +78,9 @@ keep_random_state <- function(code) {
 new_streams <- function(seed) {
   first <- seed_stream(seed)
   second <- parallel::nextRNGStream(first)
-  rlang::env(
-    agent = new_generator(stream = first), seeds = new_generator(stream = second),
-    next_stream = parallel::nextRNGStream(second)
-  )
+  restore_streams(list(
+    agent = first, seeds = second, next_stream = parallel::nextRNGStream(second)
+  ))
 }
 
 # Takes the stream of a batch.

@@ -357,12 +357,12 @@ test_that("files that cannot be written leave no connection behind", {
   before <- connections()
   nowhere <- file.path(withr::local_tempdir(), "no", "file")
   for (i in 1:3) {
-    expect_error(append_lines(nowhere, "1,2"), "cannot open")
+    expect_error(write_bytes(nowhere, raw(10), "ab"), "cannot open")
     expect_error(write_checkpoint(nowhere, 1), "cannot open")
     expect_error(write_config(nowhere, list(seed = 1)))
   }
   skip_if_not(file.exists("/dev/full"))
   expect_error(write_bytes("/dev/full", raw(10), "wb"), "not all")
-  expect_error(append_lines("/dev/full", "1,2"), "not all")
+  expect_error(write_bytes("/dev/full", raw(10), "ab"), "not all")
   expect_identical(connections(), before)
 })

@@ -62,3 +62,9 @@ test_that("pictures are normalised in the order in which R has them", {
   expect_s3_class(acting, "gym_policy_by_column")
   expect_equal(act_batch(acting, pictures, 5L, env), act(policy, pictures))
 })
+
+test_that("groups stay in the order in which they come, by one key or several", {
+  expect_identical(split_in_order(1:4, c(10, 9, 10, 9)), list(`10` = c(1L, 3L), `9` = c(2L, 4L)))
+  runs <- split_in_order(1:3, c("b", "a", "b"), c(1, 1, 2))
+  expect_identical(unname(runs), list(1L, 2L, 3L))
+})
