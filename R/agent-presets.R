@@ -118,6 +118,7 @@ preset_arguments <- function(preset) {
 #' @noRd
 make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::caller_env()) {
   match_whole_names(frame)
+  # Before list(...) evaluates an argument that makes something.
   check_no_steps(...names(), frame)
   dots <- list(...)
   check_dots_named(dots, "iterations = 100", frame)
@@ -136,29 +137,21 @@ make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::cal
   arguments <- if (goes_on) own_arguments(earlier$agent) else preset_arguments(preset)
   arguments <- replace_arguments(arguments, given[intersect(of_agent, names(given))])
   agent <- naming_own_call(rlang::exec(make, !!!arguments), make, frame)
-  training <- given[intersect(names(given), setdiff(of_training, of_agent))]
-  # The user's budget replaces the preset's, and that of the earlier training.
-  of_budget <- c("iterations", "total_steps")
-  budget <- any(of_budget %in% names(training))
-  if (goes_on && !budget) {
+  training <- given[intersect(names(given), setdiff(of_training, c(of_agent, "client")))]
+  if (goes_on && !any(of_budget %in% names(training))) {
     training <- c(training, Filter(Negate(is.null), earlier$rules[of_budget]))
-    budget <- TRUE
   }
-  check_spelling(names(kwargs), c(of_agent, of_training), budget || !is.null(preset), frame)
-  if (is.null(preset) && !budget) {
-    abort_no_budget(names(kwargs), NULL, other_presets_text(env), frame)
-  }
-  training <- preset_training(preset, training, budget)
+  budget <- !is.null(preset) || any(of_budget %in% names(training))
+  check_spelling(names(kwargs), c(of_agent, of_training), budget, frame)
+  if (!budget) abort_no_budget(names(kwargs), NULL, other_presets_text(env), frame)
   if (!is.null(preset) && !goes_on) {
-    training$policy <- training$policy %||% preset_policy(preset, agent)
     inform_of_preset(preset, env)
     agent <- with_preset(agent, preset, names(given))
   }
-  left <- setdiff(names(defaults), names(training))
-  naming_own_call(
-    rlang::exec("train_agent", agent, env, !!!training, !!!defaults[left], !!!kwargs),
-    "train_agent", frame
-  )
+  arguments <- complete_arguments(agent, env, training, preset, defaults)
+  # An empty list has no names, as in train_agent(): checkpoints compare it.
+  if (!length(kwargs)) kwargs <- list()
+  start_training(arguments, kwargs, client = given$client %||% gym_client(), frame)
 }
 
 # The arguments of an agent, of which the user's replace others. The preset's `top` was meant for
@@ -170,13 +163,24 @@ replace_arguments <- function(arguments, given) {
   arguments
 }
 
-# The arguments of training, with those of the preset that the user has not given. The user's budget
-# replaces the preset's.
-preset_training <- function(preset, training, budget) {
-  own <- c("episodes", "eval_every", "max_steps", if (!budget) "total_steps")
-  from_preset <- setdiff(intersect(own, names(preset)), names(training))
-  training[from_preset] <- preset[from_preset]
-  training
+of_budget <- c("iterations", "total_steps")
+
+#' Complete the arguments of [train_agent()]
+#' @param given Those that the user has given, which replace the preset's; a budget does, too.
+#' @param defaults Those for what neither the user nor the preset gives.
+#' @return All but `...` and `client`, a list.
+#' @noRd
+complete_arguments <- function(agent, env, given, preset, defaults = list()) {
+  arguments <- as.list(formals(train_agent))
+  arguments <- lapply(arguments[setdiff(names(arguments), c("agent", "env", "...", "client"))],
+                      eval, environment(train_agent))
+  of_preset <- c("episodes", "eval_every", "max_steps",
+                 if (!any(of_budget %in% names(given))) "total_steps")
+  for (some in list(defaults, preset[intersect(of_preset, names(preset))], given)) {
+    arguments[names(some)] <- some
+  }
+  if (!is.null(preset)) arguments$policy <- arguments$policy %||% preset_policy(preset, agent)
+  c(list(agent = agent, env = env), arguments)
 }
 
 # The agent, which keeps for provenance() where its settings are from.

@@ -80,10 +80,12 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   dots <- list(...)
   place <- "give it as a column of `settings`, as in `data.frame(%s = )`"
   check_not_of_agent(names(dots), names(formals(agent)), place, call)
+  of_training <- names(formals(train_agent))
+  kwargs <- dots[setdiff(names(dots), of_training)]
+  check_spelling(names(kwargs), of_training, any(of_budget %in% names(dots)), call)
   # The preset that the agent's own trainer, such as learn_ppo(), would use.
   kind <- Filter(function(kind) identical(agent, get(paste0("agent_", kind))),
                  unique(read_presets()$agent))
-  kwargs <- dots[setdiff(names(dots), names(formals(train_agent)))]
   preset <- if (length(kind)) find_preset(kind, env, kwargs)
   if (!is.null(preset)) inform_of_preset(preset, env)
   agents <- lapply(seq_len(nrow(settings)), function(row) {
@@ -99,7 +101,9 @@ sweep_agent <- function(agent, env, settings, seeds, report_seeds = NULL, ..., f
   if (all(failed)) rlang::cnd_signal(agents[[1L]])
   if (!is.null(folder)) dir.create(folder, showWarnings = FALSE, recursive = TRUE)
   train <- function(agents, seeds) {
-    sweep_runs(agents, env, plain_numbers(seeds), dots, preset, folder, progress, client, call)
+    training <- dots[setdiff(names(dots), names(kwargs))]
+    training$seeds <- plain_numbers(seeds)
+    sweep_runs(agents, env, training, kwargs, preset, folder, progress, client, call)
   }
   tuned <- train(agents[!failed], seeds)
   runs <- rbind(tuned$runs, data.frame(
@@ -164,25 +168,17 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
 #' @param agents A list of agents with the names of their settings.
 #' @return A list: `trainings`, those of each agent, `runs`, a table, and `interrupted`.
 #' @noRd
-sweep_runs <- function(agents, env, seeds, dots, preset, folder, progress, client, call) {
+sweep_runs <- function(agents, env, training, kwargs, preset, folder, progress, client, call) {
   started <- now()
-  of_training <- setdiff(names(formals(train_agent)), c("agent", "env", "...", "client"))
-  given <- lapply(formals(train_agent)[of_training], eval, environment(train_agent))
-  budget <- any(c("iterations", "total_steps") %in% names(dots))
-  training <- preset_training(preset, dots[intersect(names(dots), of_training)], budget)
-  given[names(training)] <- training
-  kwargs <- dots[setdiff(names(dots), of_training)]
   jobs <- lapply(names(agents), function(name) {
-    own <- c(list(agent = agents[[name]], env = env), given)
-    own["seeds"] <- list(seeds)
-    if (!is.null(preset)) own$policy <- own$policy %||% preset_policy(preset, own$agent)
+    own <- complete_arguments(agents[[name]], env, training, preset)
     if (!is.null(folder)) {
       own$checkpoint <- file.path(folder, paste0(gsub("[^A-Za-z0-9.=-]+", "_", name), ".rds"))
     }
     training_settings(own, kwargs, client, call)
   })
   runs <- unlist(lapply(seq_along(jobs), function(at) {
-    lapply(seeds, function(seed) {
+    lapply(training$seeds, function(seed) {
       run <- settings_of_seed(jobs[[at]], seed, call)
       c(run, list(job = at, keeps_error = TRUE))
     })

@@ -173,7 +173,8 @@ explain_unknown_argument <- function(cnd, given, call) {
 
 #' Find the functions that passed an argument on in their `...`
 #' @return A list of exported functions with their names, the one that the user called first. A
-#'   frame of ours with the string `make` also passes them on to the function of that name.
+#'   frame of ours with the string `make` also passes them on to the function of that name and to
+#'   train_agent().
 #' @noRd
 passed_on_by <- function(name) {
   exported <- mget(getNamespaceExports(topenv()), topenv(), "function", list(NULL))
@@ -182,7 +183,7 @@ passed_on_by <- function(name) {
     is_ours <- identical(environment(f), topenv())
     make <- if (is_ours) get0("make", sys.frame(at), inherits = FALSE)
     if (rlang::is_string(make)) {
-      return(mget(make, topenv()))
+      return(mget(c(make, "train_agent"), topenv()))
     }
     passes <- "..." %in% names(formals(f)) && name %in% evalq(...names(), sys.frame(at))
     if (passes) Filter(function(one) identical(one, f), exported)

@@ -23,9 +23,10 @@
 #'
 #' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
 #' exactly, without playing. These evaluations have 0 episodes and a standard error of 0. In a large
-#' model they take time, so between two of them lie at least so many steps of the training that they
-#' take about a tenth of it, even if `eval_every` is smaller. This number depends only on the number
-#' of states and on the step limit. It is in the training's `rules`, as `eval_steps`, and printed.
+#' model they take time. There, a minimum number of training steps lies between two of them, even if
+#' `eval_every` is smaller, so that they take about a tenth of the time. This number depends only on
+#' the number of states and on the step limit. It is printed, and is `eval_steps` in the training's
+#' `rules`.
 #'
 #' # Targets
 #'
@@ -39,9 +40,9 @@
 #' | `"Pendulum-v1"` | -200 | ours; none is registered |
 #' | `"Swimmer-v5"` | 325 | Mania, Guy and Recht (2018); registered: 360 |
 #'
-#' Training stops at a lucky moment, so a target somewhat above the environment's makes it more
-#' likely that the final evaluation reaches the latter. Use the same target for trainings that you
-#' compare.
+#' Training tends to stop when the policy was lucky. A target somewhat above the environment's makes
+#' it more likely that the final evaluation reaches the environment's. Use the same target for
+#' trainings that you compare.
 #'
 #' # Sampling from a model
 #'
@@ -201,12 +202,22 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
   force(env)
   # Do not evaluate `client`: a training that needs no server must not start one.
   given <- mget(setdiff(names(formals()), c("...", "client")), call)
-  settings <- training_settings(given, list(...), client, call)
-  if (!is.null(seeds)) {
-    return(train_seeds(settings, seeds, progress, client, call))
+  kwargs <- list(...)
+  budget <- !is.null(iterations) || !is.null(total_steps)
+  check_spelling(names(kwargs), names(formals(train_agent)), budget, call)
+  place <- paste0("it goes into its parentheses, as in `", maker_of(agent), "(%s = )`")
+  check_not_of_agent(names(kwargs), settings_of(agent), place, call)
+  start_training(given, kwargs, client, call)
+}
+
+# Trains once, or once with each of `seeds`; the arguments are those of training_settings().
+start_training <- function(given, kwargs, client, call) {
+  settings <- training_settings(given, kwargs, client, call)
+  if (!is.null(given$seeds)) {
+    return(train_seeds(settings, given$seeds, given$progress, client, call))
   }
   in_env <- function(play) with_training_env(settings, play, client, call)
-  do_run(settings, in_env, client, progress, call)
+  do_run(settings, in_env, client, given$progress, call)
 }
 
 #' Check the arguments of a training and complete them
@@ -216,28 +227,20 @@ train_agent <- function(agent, env, policy = NULL, iterations = NULL, total_step
 #' @noRd
 training_settings <- function(given, kwargs, client, call) {
   env <- given$env
-  check_no_steps(names(kwargs), call)
-  budget <- !is.null(given$iterations) || !is.null(given$total_steps)
-  check_spelling(names(kwargs), names(formals(train_agent)), budget, call)
-  solved_by <- check_choice(given$solved_by[1L], c("evaluation", "candidate"), arg = "solved_by")
+  solved_by <- check_choice(given$solved_by[1L], c("evaluation", "candidate"), "solved_by", call)
+  # By the tutorial's rule the training is a search, in which each candidate is a round.
   search <- solved_by == "candidate"
-  make <- sub("^gym_", "", class(given$agent)[[1L]])
-  check_not_of_agent(names(kwargs), settings_of(given$agent),
-                     paste0("it goes into its parentheses, as in `", make, "(%s = )`"), call)
-  agent <- given$agent <- agent_to_train(given$agent, given$policy, search, call)
+  agent <- agent_to_train(given$agent, given$policy, search, call)
   online <- learns_online(agent)
   check_flag(given$model, arg = "model", call = call)
   settings <- c(
-    given[c("agent", "env", "iterations", "total_steps", "episodes", "target", "max_steps",
-            "eval_every", "eval_episodes", "eval_episodes_curve", "seed", "callback",
-            "checkpoint", "resume")],
+    given[c("env", "iterations", "total_steps", "episodes", "target", "max_steps", "eval_every",
+            "eval_episodes", "eval_episodes_curve", "seed", "callback", "checkpoint", "resume")],
     list(
-      kwargs = kwargs,
-      policy = policy_to_train(given$policy, agent),
-      evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), arg = "evaluate"),
-      # By the tutorial's rule the training is a search, in which each candidate is a round.
-      search = search,
-      may_sample = online && given$model
+      agent = agent, kwargs = kwargs, policy = policy_to_train(given$policy, agent),
+      evaluate = check_choice(given$evaluate[1L], c("greedy", "draw"), "evaluate", call),
+      search = search, may_sample = online && given$model,
+      what = if (search) "search" else "training", unit = if (search) "round" else "iteration"
     )
   )
   check_training(settings, call)
@@ -246,28 +249,19 @@ training_settings <- function(given, kwargs, client, call) {
     check_string(given[[name]], allow_null = TRUE, arg = name, call = call)
   }
   if (!is.null(given$seeds)) check_training_seeds(given$seeds, given$seed, call)
-  settings[c("what", "unit")] <- if (settings$search) {
-    c("search", "round")
-  } else {
-    c("training", "iteration")
-  }
   settings$num_envs <- given$num_envs %||% if (online) learner_envs(env, agent)
   settings$num_workers <- given$num_workers
   settings$log <- if (!is.null(given$log)) absolute_path(given$log)
   if (is.null(given$seeds)) settings <- with_checkpoint(settings, call)
   settings$kwargs <- with_random_map(env, kwargs, settings$seed %||% given$seeds)
   settings$model <- if (online) judging_model(settings, client)
-  known <- !is.null(settings$model)
   settings["eval_steps"] <- list(
-    if (known) steps_between_evaluations(settings$model, settings$max_steps)
+    if (!is.null(settings$model)) steps_between_evaluations(settings$model, settings$max_steps)
   )
   # `learn_q("Taxi-v4")` is `learn_q(env_model("Taxi-v4"))`.
-  settings$from_model <- known && samples_model(settings, wants_random_map(env, kwargs))
-  settings$played <- if (settings$from_model) {
-    list(env = model_to_sample(settings, call))
-  } else {
-    settings[c("env", "kwargs")]
-  }
+  sampled <- sampled_model(settings, wants_random_map(env, kwargs), call)
+  settings$from_model <- !is.null(sampled)
+  settings$played <- if (is.null(sampled)) settings[c("env", "kwargs")] else list(env = sampled)
   settings
 }
 

@@ -38,7 +38,7 @@ check_training <- function(settings, call) {
   }
 }
 
-# Otherwise it would be taken for an argument of the environment.
+# Otherwise `steps` would be taken for an argument of the environment.
 check_no_steps <- function(names, call) {
   abort_if(
     "steps" %in% names, "steps", NULL, call,
@@ -47,7 +47,7 @@ check_no_steps <- function(names, call) {
   )
 }
 
-# Otherwise it, too, would be taken for one of the environment.
+# Otherwise an argument of the agent, too, would be taken for one of the environment.
 check_not_of_agent <- function(names, of_agent, place, call) {
   own <- intersect(names, of_agent)
   abort_if(
@@ -60,6 +60,7 @@ check_not_of_agent <- function(names, of_agent, place, call) {
 # A misspelt argument would be taken for one of the environment. A name that only resembles another
 # may really be one: it is refused only if training cannot start anyway.
 check_spelling <- function(names, choices, can_begin, call) {
+  check_no_steps(names, call)
   for (name in names) {
     near <- nearest_name(name, choices)
     abort_if(
@@ -91,8 +92,8 @@ abort_no_budget <- function(names, agent, presets, call) {
 check_training_ends <- function(vector_env, settings, online, call) {
   check_has_end(vector_env, settings$max_steps %||% Inf)
   model <- settings$model
-  limit <- settings$max_steps %||% model$spec$max_episode_steps
-  if (!online || is.null(model) || !is.null(limit) || inherits(settings$agent, "gym_agent_td")) {
+  ends <- is.null(model) || model_limit(model, settings$max_steps) < Inf
+  if (!online || ends || inherits(settings$agent, "gym_agent_td")) {
     return()
   }
   state <- state_without_end(model)

@@ -40,9 +40,12 @@ goes_on_from <- function(x, class) {
     length(settings_of(x$agent))
 }
 
+# The name of the function that makes an agent of this package.
+maker_of <- function(agent) sub("^gym_", "", class(agent)[[1L]])
+
 # The names of an agent's settings, which are the arguments of the function that makes it.
 settings_of <- function(agent) {
-  make <- get0(sub("^gym_", "", class(agent)[[1L]]), topenv(), "function", inherits = FALSE)
+  make <- get0(maker_of(agent), topenv(), "function", inherits = FALSE)
   names <- names(formals(make))
   # DQN's argument `memory` is the size of its memory.
   if ("memory_size" %in% names(agent)) names <- sub("^memory$", "memory_size", names)

@@ -160,14 +160,13 @@ learns_in_play <- function(state, vector_env, settings) {
 
 # One sub-environment plays one episode after the other.
 learn_alone <- function(learner, state, vector_env, settings, call) {
-  check_has_end(vector_env, settings$max_steps %||% Inf)
   world <- state$world
   if (is.null(world) || !is.null(state$agent$mask)) {
     world <- state$world <- world_of(vector_env, state$agent$basis, state$uniform$draw)
   }
   seeds <- with_generator(state$streams$seeds, draw_training_seeds(settings$episodes))
   stream <- new_generator(stream = take_stream(state$streams))
-  limit <- min(settings$max_steps %||% Inf, vector_env$model$spec$max_episode_steps %||% Inf)
+  limit <- model_limit(vector_env$model, settings$max_steps)
   guard <- world$guard %||% identity
   with_generator(stream, naming_call(
     guard(play_steps(learner, world, seeds, limit, state$report, call)), vector_env
@@ -232,25 +231,25 @@ modelled_ids <- "^(FrozenLake|CliffWalking|Taxi)"
 
 # Sampling from a model ---------------------------------------------------------------
 
-#' Does a learner sample from the model instead of playing on the server?
+#' Find the model that a learner samples from instead of playing on the server
 #' @param draws_map Whether the environment draws a map when it is made.
+#' @return A model, `NULL` for none.
 #' @noRd
-samples_model <- function(settings, draws_map) {
+sampled_model <- function(settings, draws_map, call) {
   env <- settings$env
+  model <- settings$model
   needs_server <- c(
-    settings$agent$mask, settings$num_workers,
+    settings$agent$mask, settings$num_workers, settings$callback,
     intersect(setdiff(how_made(), "max_episode_steps"), names(settings$kwargs))
   )
-  settings$may_sample && rlang::is_string(env) && !is_registered(env) && !draws_map &&
-    is.null(settings$callback) && !length(needs_server)
-}
-
-model_to_sample <- function(settings, call) {
-  model <- settings$model
+  by_id <- rlang::is_string(env) && !is_registered(env)
+  if (is.null(model) || !settings$may_sample || !by_id || draws_map || length(needs_server)) {
+    return(NULL)
+  }
   id <- model$spec$id
   abort_if(
-    is.null(settings$max_steps) && is.null(model$spec$max_episode_steps),
-    "max_steps", NULL, call, "{id} has no step limit, so an episode may never end.",
+    model_limit(model, settings$max_steps) == Inf, "max_steps", NULL, call,
+    "{id} has no step limit, so an episode may never end.",
     i = "Give `max_steps`, such as `max_steps = 1000`, after which an episode is cut off."
   )
   cli::cli_inform(
@@ -270,7 +269,7 @@ evaluate_exactly <- function(model, policy, max_steps) {
   if (is.null(probabilities)) {
     return(NULL)
   }
-  limit <- exact_limit(model, max_steps)
+  limit <- model_limit(model, max_steps)
   value <- expected_return(model, model$backup, probabilities, limit, 1, NULL)
   data.frame(
     candidate = 1L, mean_return = value, se = 0, lower = value, upper = value, episodes = 0L,
@@ -278,7 +277,8 @@ evaluate_exactly <- function(model, policy, max_steps) {
   )
 }
 
-exact_limit <- function(model, max_steps) {
+# The number of steps after which an episode in the model is cut off.
+model_limit <- function(model, max_steps) {
   min(max_steps %||% Inf, model$spec$max_episode_steps %||% Inf)
 }
 
@@ -290,7 +290,7 @@ exact_limit <- function(model, max_steps) {
 #' @return A number of steps.
 #' @noRd
 steps_between_evaluations <- function(model, max_steps) {
-  limit <- exact_limit(model, max_steps)
+  limit <- model_limit(model, max_steps)
   states <- model$backup$states
   # Without a limit equations are solved, which takes about as long as a sweep for each state.
   updates <- states * if (limit == Inf) states else limit

@@ -252,6 +252,33 @@ test_that("an agent that returns nonsense is refused, and what it returned shown
           "`agent_tell()` must return an agent, not NULL")
 })
 
+test_that("an error about a choice names the function that the user called", {
+  choices <- list(list(evaluate = "best"), list(solved_by = "luck"))
+  for (wrong in choices) {
+    cnd <- expect_error(rlang::exec(quiet_training, agent_ars(), iterations = 1, !!!wrong),
+                        class = "gym_error_argument")
+    expect_identical(cnd$call[[1]], quote(train_agent))
+  }
+})
+
+test_that("an agent that asks for nothing plays its behavior policy as it is", {
+  trained <- function() {
+    agent <- structure(list(), class = c("silent", "gym_agent"))
+    quiet_training(agent, iterations = 2, target = Inf)$agent
+  }
+  .S3method("agent_tell", "silent", function(agent, results) {
+    agent$weights <- results$weights
+    agent$returns <- c(agent$returns, results$returns)
+    agent
+  })
+  by_default <- trained()
+  .S3method("agent_ask", "silent", function(agent) NULL)
+  silent <- trained()
+  expect_null(silent$weights)
+  expect_identical(silent$returns, by_default$returns)
+  expect_identical(drop(by_default$weights), coef(silent$policy))
+})
+
 test_that("an agent of one's own trains, and goes on from its file", {
   skip_unless_all()
   .S3method("agent_ask", "walk", function(agent) {
@@ -356,13 +383,13 @@ test_that("a line of the log that a full disk cut is whole again when the traini
 
 test_that("the log has all lines again after one that could not be written", {
   folder <- withr::local_tempdir()
-  write <- append_lines
-  local_functions(append_lines = function(table, lines) {
-    if (startsWith(lines[[1]], "2,")) {
-      cat("2,10", file = table, append = TRUE)
+  write <- write_bytes
+  local_functions(write_bytes = function(path, bytes, mode) {
+    if (mode == "ab" && startsWith(rawToChar(bytes), "2,")) {
+      cat("2,10", file = path, append = TRUE)
       stop("No space left on device")
     }
-    write(table, lines)
+    write(path, bytes, mode)
   })
   expect_warning(
     trained <- quiet_training(agent_ars(), iterations = 4, target = Inf, log = folder),
