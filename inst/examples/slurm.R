@@ -24,7 +24,7 @@ if (nzchar(Sys.which("sbatch"))) {
 
 trained <- train_agent(
   agent_ars(directions = 8, top = 4), "Acrobot-v1", policy_linear(normalize = TRUE),
-  iterations = 5, seeds = 1:3, eval_episodes = 20,
+  iterations = 5, seeds = 1:2, eval_episodes = 20,
   checkpoint = file.path(folder, "acrobot.rds"), log = file.path(folder, "acrobot")
 )
 print(trained)

@@ -84,7 +84,7 @@ local_failing_uv <- function(words, frame = parent.frame()) {
 }
 
 wait_until <- function(condition) {
-  for (i in 1:600) {
+  for (i in 1:3000) {
     if (condition()) {
       return(invisible(TRUE))
     }

@@ -1,10 +1,12 @@
 """Write a model of each algorithm, as R reads it, and the actions that it takes.
 
-Called with a folder and the number of observations. The models are not trained; their weights,
+Of some models there is a zip file, too, and in a folder "zip" what R reads of that. Called with a
+folder and the number of observations. The models are not trained; their weights,
 moments and normalizations are drawn, so that none is 0 or 1.
 """
 
 import sys
+import threading
 from pathlib import Path
 
 import gymnasium
@@ -12,7 +14,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from gym_server.sb3 import algorithms, files, policies
+from gym_server.sb3 import algorithms, convert, files, policies
 
 folder, n = Path(sys.argv[1]), int(sys.argv[2])
 draws = np.random.default_rng(1)
@@ -71,6 +73,9 @@ for case, (name, env_id, settings) in CASES.items():
     )
     if case in ("SAC", "PPO of a Box", "QRDQN", "A2C with LeakyReLU"):
         model.save(place / "model.zip")
+        job = {"file": str(place / "model.zip"), "activation": None, "moments": None}
+        (place / "zip").mkdir()
+        convert.convert(job, place / "zip", threading.Event())
     policy = model.policy.double()
     policy.set_training_mode(False)
     with torch.no_grad():

@@ -1,6 +1,9 @@
-"""Policies that stay with Stable-Baselines3, against the library's own evaluation."""
+"""Policies that stay with Stable-Baselines3, against the library's own evaluation; zip files."""
 
+import json
+import pickle
 import threading
+import zipfile
 from importlib.util import find_spec
 
 import numpy as np
@@ -23,7 +26,7 @@ def game():
     from stable_baselines3.common.atari_wrappers import AtariWrapper
 
     gymnasium.register_envs(ale_py)
-    env = gymnasium.make("ALE/Pong-v5", frameskip=1, max_num_frames_per_episode=400)
+    env = gymnasium.make("ALE/Pong-v5", frameskip=1, max_num_frames_per_episode=200)
     return AtariWrapper(env, terminal_on_life_loss=False, clip_reward=False)
 
 
@@ -53,7 +56,7 @@ CASES = {
     "convolutional": (
         {
             **{"algorithm": "PPO", "policy": "CnnPolicy", "env_id": "ALE/Pong-v5", "atari": True},
-            "env_kwargs": {"max_num_frames_per_episode": 400},
+            "env_kwargs": {"max_num_frames_per_episode": 200},
         },
         game,
     ),
@@ -165,3 +168,35 @@ def test_a_policy_that_is_no_network_plays_as_in_stable_baselines3(case, tmp_pat
     assert played == expected
     assert acted == predicted
     assert len(set(acted)) > 1
+
+
+def error_of_converting(folder, part):
+    from gym_server.sb3 import convert, failures
+
+    job = {"file": str(folder / "model.zip"), "activation": None, "moments": None}
+    try:
+        convert.convert(job, folder, threading.Event())
+    except Exception as error:
+        return failures.in_words(error)[part]
+    return None
+
+
+class Harm:
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (self.path, "w")
+
+
+def test_a_zip_file_with_a_pickle_instead_of_weights_is_not_loaded(tmp_path, child):
+    ran = tmp_path / "ran"
+    with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
+        archive.writestr("data", json.dumps({"action_space": {":type:": "Box"}}))
+        archive.writestr("policy.pth", pickle.dumps(Harm(str(ran))))
+    assert "is not loaded" in child(error_of_converting, tmp_path, "hint")
+    assert not ran.exists()
+    (tmp_path / "model.zip").write_text("no zip")
+    assert "no model that Stable-Baselines3 saved" in child(
+        error_of_converting, tmp_path, "message"
+    )

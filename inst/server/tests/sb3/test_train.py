@@ -121,6 +121,16 @@ def test_a_robot_is_trained_by_the_program(tmp_path):
     assert json.loads((tmp_path / "result.json").read_text())["steps"] == 32
 
 
+def test_the_same_seed_is_the_same_training(tmp_path, child):
+    policies = []
+    for seed in (1, 1, 2):
+        folder = tmp_path / str(len(policies))
+        folder.mkdir()
+        child(train, folder, seed=seed)
+        policies.append((folder / "policy.safetensors").read_bytes())
+    assert policies[0] == policies[1] != policies[2]
+
+
 def test_a_loss_that_is_nan_ends_the_training_and_finite_weights_are_kept(tmp_path, child):
     arguments = {**JOB["arguments"], "learning_rate": 1e30}
     result = child(train, tmp_path, total_steps=2000, arguments=arguments)
