@@ -117,7 +117,7 @@ test_that("values that a wrapper has changed have no units and no limits", {
   labels <- function(env) {
     played <- rollout(env, policy_random(), seed = 1, steps = TRUE)
     drawn <- trajectory_plot_data(played)
-    list(names = drawn$panels$panel, limits = nrow(drawn$limits))
+    list(names = names(drawn$titles), limits = nrow(drawn$limits))
   }
   car <- slow_car()
   kept <- list(names = c("position (m)", "velocity", "action"), limits = 1L)

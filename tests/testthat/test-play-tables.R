@@ -86,7 +86,7 @@ test_that("a plot shows the episode of the candidate that it was asked for", {
     expect_identical(data$length, length)
     expect_match(data$subtitle, paste0("^candidate ", candidate, ", episode 3: return ", length))
   }
-  expect_identical(data$panels$panel, c(paste0("obs_", 1:4), "action"))
+  expect_identical(names(data$titles), c(paste0("obs_", 1:4), "action"))
   local_device()
   plot(played, type = "trajectory", candidate = 2, episode = 3)
   refuse <- function(..., what) {
@@ -129,7 +129,7 @@ test_that("the paths of candidates' episodes are apart", {
 
 test_that("what is observed next is shown in a trajectory only when it is asked for", {
   played <- two_candidates(steps = TRUE, next_observation = TRUE)
-  expect_identical(trajectory_plot_data(played)$panels$panel, c(paste0("obs_", 1:4), "action"))
+  expect_identical(names(trajectory_plot_data(played)$titles), c(paste0("obs_", 1:4), "action"))
   chosen <- trajectory_plot_data(played, variables = c("obs_1", "next_obs_1"))
-  expect_identical(chosen$panels$panel, c("obs_1", "next_obs_1", "action"))
+  expect_identical(names(chosen$titles), c("obs_1", "next_obs_1", "action"))
 })
