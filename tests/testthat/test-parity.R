@@ -2,8 +2,8 @@
 # the server for R, and in process by reference_trajectories.py, with the same seed
 # and actions. The observations, rewards, flags and frames are compared byte by byte.
 #
-# All Atari games observe large pictures, and all robots long vectors: one game in forty plays 20
-# steps, and one robot in three 30, as all others do; `make test` has a sixth of these play 10. With
+# All Atari games observe large pictures, and all robots long vectors: one game in eighty plays 20
+# steps, and one robot in six 30, as all others do; `make test` has a sixth of these play 10. With
 # GYM_TEST_PARITY=all, as `make soak` has it, every environment plays 200. (The server's
 # test_environments.py makes, resets, steps and draws games and others.)
 
@@ -13,7 +13,7 @@ if (soaks("GYM_TEST_PARITY")) {
   played$steps <- 200L
 } else {
   played$steps <- if (tests_all()) ifelse(played$family == "atari", 20L, 30L) else 10L
-  every <- c(atari = 40L, mujoco = 3L)
+  every <- c(atari = 80L, mujoco = 6L)
   for (family in names(every)) {
     alike <- which(played$family == family)
     played <- played[-alike[seq_along(alike) %% every[[family]] != 1L], ]
