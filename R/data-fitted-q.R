@@ -111,15 +111,19 @@ fit_rule <- function(steps, recipe, call) {
   }
   prepared <- prepare_steps(steps, regression, recipe$stages)
   prepared <- weigh_steps(prepared, rep(1, length(steps$step)))
-  # A sweep needs the values of all states, other updates those of each step's next state.
+  # A sweep needs the values of all states, other updates those of each step's next state. A table
+  # computes each of these once.
   sweep <- if (recipe$table && !recipe$double) table_sweep(prepared, regression, recipe$discount)
-  after <- if (is.null(sweep)) prepared$after else seq_len(nrow(regression$states))
+  after <- prepared$after
+  if (!is.null(regression$states)) after <- unique(after)
+  place <- if (is.null(regression$states)) TRUE else match(prepared$after, after)
+  if (!is.null(sweep)) after <- seq_len(nrow(regression$states))
   fits <- iterate_fits(
     function(fit, step, ahead) {
       if (recipe$double) {
         double_update(prepared, regression, fit, step, recipe$discount)
       } else if (is.null(sweep) || is.null(ahead)) {
-        fit_targets(prepared, regression, ahead, step, recipe$discount)
+        fit_targets(prepared, regression, ahead[place], step, recipe$discount)
       } else {
         sweep(fit, ahead)
       }
