@@ -52,7 +52,7 @@ animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
 
 #' @export
 animate.default <- function(x, file = NULL, fps = NULL, ...) {
-  if (is_given_by_id(x) || is_playable(x)) {
+  if (!is.null(given_id(x)) || is_playable(x)) {
     abort_wrong("x", x, rlang::current_env(),
                 "`animate()` shows an episode that was played, and `x` is an environment.",
                 i = "`animate(rollout(env, policy, frames = TRUE))` plays one.")

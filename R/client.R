@@ -150,7 +150,6 @@ parse_server_error_or_raise_for_status <- function(response) {
   if (!inherits(response, "response")) {
     abort_argument(response, "an answer of httr's", "response", rlang::current_env())
   }
-  response$answer <- tryCatch(parsed_body(response), error = function(cnd) NULL)
   answer <- read_answer(response, response$request$method %||% "Request to")
   if (is.null(answer)) invisible() else answer
 }

@@ -103,14 +103,15 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
       call = call
     )
   }
-  single <- frames || length(remembering(wrapper_names(noted_wrappers(x))))
+  given <- given_id(x)
+  single <- frames || length(given$remembers)
   made <- if (single) {
     list(env = make(NULL))
   } else {
-    own <- arguments[!rlang::names2(arguments) %in% how_made()]
+    own <- arguments[!rlang::names2(arguments) %in% how_made]
     # The same environment without the wrappers that are applied in R.
-    inside <- if (calls_r(x)) {
-      with_wrappers(x$env_id, split_wrappers(x$wrappers, NULL)$server)
+    inside <- if (given$calls_r) {
+      with_wrappers(given$id, split_wrappers(given$wrappers, NULL)$server)
     } else {
       x
     }
@@ -284,12 +285,12 @@ if_supported <- function(code) {
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
-  played_here <- frames || !is_made_by_server(env_id) || any(names(arguments) %in% how_made()) ||
-    calls_r(env_id) || length(remembering(wrapper_names(noted_wrappers(env_id))))
+  given <- given_id(env_id)
+  played_here <- frames || is.null(given) || given$registered || given$calls_r ||
+    length(given$remembers) || any(names(arguments) %in% how_made)
   if (played_here) {
     return(NULL)
   }
-  check_dots_named(arguments, "seed = 1", call)
   check_client(client, call = call)
   described <- known_description(client, env_id, arguments, call)
   other_size <- isTRUE(described$one_seed) && !is.null(num_envs) && num_envs != described$num_envs
@@ -310,18 +311,11 @@ known_description <- function(client, env_id, arguments, call) {
   described[[key]][[1L]]
 }
 
-# The names of arguments that do not belong to the environment.
-how_made <- function() {
-  setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
-}
-
-# Whether it is given by an id that a server knows.
-is_made_by_server <- function(env) is_given_by_id(env) && !is_registered(env)
-
 ask_description <- function(client, env_id, arguments, call) {
-  wrappers <- noted_wrappers(env_id)
+  given <- given_id(env_id)
+  wrappers <- given$wrappers
   fields <- c(
-    env_id = json_string(bare_id(env_id)), kwargs = if (length(arguments)) to_json(arguments),
+    env_id = json_string(given$id), kwargs = if (length(arguments)) to_json(arguments),
     wrappers = if (length(wrappers)) wrappers_json(wrappers)
   )
   answer <- tryCatch(
@@ -337,13 +331,6 @@ ask_description <- function(client, env_id, arguments, call) {
   if (is.null(answer) || length(answer$remembers)) {
     return(NULL)
   }
-  is_natural <- function(x) is_number(x) && are_whole(x, 1, 2^24)
-  check_optional(answer, "env_id", rlang::is_string, "a string")
-  check_optional(answer, "spec", is_object, "an object")
-  check_optional(answer, "group", is_natural, "a whole number")
-  check_optional(answer, "processes", is_natural, "a whole number")
-  check_optional(answer, "needs_max_steps", rlang::is_bool, "true or false")
-  check_optional(answer$spec, "max_episode_steps", is_number, "a number")
   observed <- read_space(answer, "observation_space")
   observed$names <- observation_names(answer$env_id, observed, wrapper_names(wrappers))
   num_envs <- answer$group %||% count_sub_envs(observation_bytes(observed))
@@ -355,7 +342,7 @@ ask_description <- function(client, env_id, arguments, call) {
     description = list(
       fields = fields, group = answer$group, processes = answer$processes %||% 1L,
       needs_max_steps = answer$needs_max_steps %||% is.null(answer$spec$max_episode_steps),
-      versions = answer$versions, processor = shown_line(string_or_null(answer$processor))
+      versions = answer$versions, processor = shown_line(answer$processor)
     )
   )
   # How many episodes its last request had, see play_requests().

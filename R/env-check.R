@@ -51,7 +51,7 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   match_whole_names()
   check_count(max_steps)
   check_seed(seed, min = 0)
-  made <- (is.list(env) || is.environment(env)) && !is_given_by_id(env)
+  made <- (is.list(env) || is.environment(env)) && is.null(given_id(env))
   if (made) {
     check_made_before(NULL, list(...), env)
   } else {

@@ -4,8 +4,9 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
                             num_workers = NULL, call = rlang::caller_env()) {
   check_wrappers(wrappers, call = call)
-  wrappers <- c(noted_wrappers(env_id), wrappers)
-  env_id <- bare_id(env_id)
+  given <- given_id(env_id)
+  wrappers <- c(given$wrappers, wrappers)
+  env_id <- given$id %||% env_id
   calling_r <- intersect(wrapper_names(wrappers), names(transforms))
   if (length(calling_r)) {
     abort_wrong("wrappers", calling_r, call,
@@ -15,9 +16,20 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
   check_string(env_id, call = call)
   check_string(render_mode, allow_null = TRUE, call = call)
   check_count(num_envs, allow_null = TRUE, call = call)
-  check_vector_mode(vectorization_mode, vectorization_modes, num_envs, call = call)
-  check_vector_mode(autoreset_mode, autoreset_modes, num_envs, call = call)
-  check_num_workers(num_workers, num_envs, call = call)
+  if (!is.null(vectorization_mode)) {
+    check_choice(vectorization_mode, vectorization_modes, call = call)
+  }
+  if (!is.null(autoreset_mode)) check_choice(autoreset_mode, autoreset_modes, call = call)
+  check_count(num_workers, min = 0, allow_null = TRUE, call = call)
+  of_sub_envs <- c(
+    vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode,
+    num_workers = num_workers
+  )
+  abort_if(
+    is.null(num_envs) && length(of_sub_envs), names(of_sub_envs)[[1L]], of_sub_envs[[1L]], call,
+    "`{names(of_sub_envs)[[1L]]}` is for an environment with sub-environments.",
+    i = "Give their number as `num_envs`."
+  )
   check_string(name, allow_null = TRUE, call = call)
   numbers <- list(num_envs = num_envs, num_workers = num_workers)
   texts <- list(
@@ -90,13 +102,8 @@ known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   instance
 }
 
-# Calling handlers, such as those of read_values(), do not run after a stack overflow.
 read_space <- function(answer, name) {
-  what <- paste0("Its `", name, "`")
-  tryCatch(
-    read_values(new_space(answer[[name]]), what),
-    stackOverflowError = function(cnd) abort_answer(paste(what, "is nested too deeply"))
-  )
+  read_values(new_space(answer[[name]]), paste0("Its `", name, "`"))
 }
 
 #' Find out whether an instance has ended with its server
@@ -139,7 +146,6 @@ check_not_ended <- function(client, instance_id, call = rlang::caller_env()) {
 
 # Makes an instance from the server's description, after creating it or on request.
 new_instance <- function(client, instance_id, about) {
-  check_about(about)
   instance <- new.env(parent = emptyenv())
   instance$client <- client
   instance$id <- instance_id
@@ -173,20 +179,18 @@ read_spec <- function(env_id, spec) {
   c(
     list(
       id = shown_line(env_id),
-      reward_threshold = if (!is.null(threshold)) number_from(threshold, "reward_threshold"),
+      reward_threshold = if (!is.null(threshold)) number_from_json(threshold),
       max_episode_steps = spec$max_episode_steps,
       # The environment's own metadata may be anything.
       render_fps = if (is_number(spec$render_fps)) spec$render_fps
     ),
-    if (length(spec$engine)) list(engine = texts_of(spec$engine))
+    if (length(spec$engine)) list(engine = lapply(spec$engine, shown_line))
   )
 }
 
-texts_of <- function(json) lapply(Filter(rlang::is_string, as.list(json)), shown_line)
-
 # Gymnasium's warnings about an environment that the server made.
 warn_as_gymnasium <- function(answer) {
-  for (text in texts_of(answer$warnings)) {
+  for (text in lapply(answer$warnings, shown_line)) {
     rlang::warn(text, class = "gym_warning_gymnasium", .frequency = "once",
                 .frequency_id = paste("gym", text))
   }
@@ -254,7 +258,7 @@ with_random_map <- function(env, arguments, seed) {
 
 # By default FrozenLake has a map with a name.
 wants_random_map <- function(env, arguments) {
-  id <- bare_id(env)
+  id <- given_id(env)$id
   rlang::is_string(id) && grepl("^FrozenLake", id) && "map_name" %in% names(arguments) &&
     is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
 }

@@ -130,8 +130,9 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   check_client(client, call = call)
   kwargs <- with_random_map(env_id, kwargs, seed)
   check_wrappers(wrappers, call = call)
-  wrappers <- split_wrappers(c(noted_wrappers(env_id), wrappers), call)
-  env_id <- bare_id(env_id)
+  given <- given_id(env_id)
+  wrappers <- split_wrappers(c(given$wrappers, wrappers), call)
+  env_id <- given$id %||% env_id
   env <- NULL
   instance_id <- NULL
   on.exit(if (is.null(env)) close_unused(client, instance_id))
@@ -147,6 +148,9 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   for (wrapper in wrappers$r) env <- wrap_server_env(env, wrapper[[1L]], wrapper[-1L], call)
   env
 }
+
+# The names of the arguments that do not belong to the environment.
+how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
 
 # Rewrites an error about an unknown argument of the environment in R's terms.
 explain_unknown_argument <- function(cnd, given, call) {

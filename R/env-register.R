@@ -80,12 +80,6 @@ gym_unregister <- function(id) {
   invisible(id)
 }
 
-# Whether the id is registered in this session, which a server cannot know.
-is_registered <- function(x) {
-  id <- bare_id(x)
-  rlang::is_string(id) && id %in% names(the_session$environments)
-}
-
 # Making one ---------------------------------------------------------------------------
 
 #' Make a registered environment
@@ -93,7 +87,8 @@ is_registered <- function(x) {
 #' @param arguments The arguments of `entry_point`, and `max_episode_steps`, -1 for no limit.
 #' @noRd
 make_registered <- function(id, arguments = list(), call = rlang::caller_env()) {
-  registered <- the_session$environments[[bare_id(id)]]
+  given <- given_id(id)
+  registered <- the_session$environments[[given$id]]
   changes <- registered$changes
   if ("max_episode_steps" %in% names(arguments)) {
     limit <- arguments$max_episode_steps
@@ -103,25 +98,25 @@ make_registered <- function(id, arguments = list(), call = rlang::caller_env()) 
     arguments$max_episode_steps <- NULL
   }
   check_not_shared(arguments, call = call)
-  given <- registered$arguments
-  given[names(arguments)] <- arguments
+  own <- registered$arguments
+  own[names(arguments)] <- arguments
   env <- registered$entry_point
   if (!inherits(env, "gym_r_env")) {
     known <- names(formals(args(env)))
-    strange <- if (!"..." %in% known) setdiff(names(given), known)
+    strange <- if (!"..." %in% known) setdiff(names(own), known)
     from <- "those of the `entry_point` that it was given"
-    refuse_argument(strange, known, bare_id(id), from, call)
-    env <- with_generator(new_generator(0L), do.call(env, given))
-    given <- list()
+    refuse_argument(strange, known, given$id, from, call)
+    env <- with_generator(new_generator(0L), do.call(env, own))
+    own <- list()
     if (!is_playable(env)) {
       abort_wrong("entry_point", env, call,
-                  "The `entry_point` of {bare_id(id)} must return an environment, not
+                  "The `entry_point` of {given$id} must return an environment, not
                    {describe_argument(env)}.",
                   i = "Make one by `gym_env()`.")
     }
   }
-  if (inherits(env, "gym_r_env")) env <- change_r_env(env, changes, given, bare_id(id), call)
-  for (wrapper in noted_wrappers(id)) env <- wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
+  if (inherits(env, "gym_r_env")) env <- change_r_env(env, changes, own, given$id, call)
+  for (wrapper in given$wrappers) env <- wrap_r_env(env, wrapper[[1L]], wrapper[-1L], call)
   env
 }
 
@@ -212,7 +207,7 @@ registered_rows <- function(search = NULL) {
 # A server has no access to an environment written in R.
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
   if (is_registered(env_id)) {
-    id <- bare_id(env_id)
+    id <- given_id(env_id)$id
     abort_wrong("env_id", env_id, call,
                 "{id} is an environment written in R, which a server cannot make.",
                 i = "`gym_make(\"{id}\")` makes it here.")
@@ -245,14 +240,12 @@ env_registry <- function(client = gym_client(), search = NULL) {
   check_string(search, allow_null = TRUE)
   route <- paste0("/v1/registry/", query_text(list(search = search)[!is.null(search)]))
   environments <- get_answer(client, route)$environments
+  column <- function(name, missing) listed_column(environments, name, missing)
   servers <- data.frame(
-    id = listed_texts(environments, "id", ""),
-    max_episode_steps = listed_counts(environments, "max_episode_steps"),
-    reward_threshold = listed_numbers(environments, "reward_threshold"),
-    vectorised = listed_flags(environments, "vectorised"),
-    extra = listed_texts(environments, "extra"),
-    available = listed_flags(environments, "available"),
-    reason = listed_texts(environments, "reason")
+    id = column("id", ""), max_episode_steps = column("max_episode_steps", NA_integer_),
+    reward_threshold = column("reward_threshold", NA_real_), vectorised = column("vectorised", NA),
+    extra = column("extra", NA_character_), available = column("available", NA),
+    reason = column("reason", NA_character_)
   )
   own <- registered_rows(search)
   rbind(servers[!servers$id %in% own$id, ], own, make.row.names = FALSE)
@@ -283,11 +276,11 @@ env_list <- function(client = gym_client()) {
   check_client(client)
   close_queued(client)
   instances <- get_answer(client, "/v1/instances/")$instances
+  column <- function(name, missing) listed_column(instances, name, missing)
   data.frame(
-    instance_id = listed_texts(instances, "instance_id", ""),
-    name = listed_texts(instances, "name"), env_id = listed_texts(instances, "env_id", ""),
-    num_envs = listed_counts(instances, "num_envs"), age = listed_numbers(instances, "age_seconds"),
-    idle = listed_numbers(instances, "idle_seconds"), steps = listed_numbers(instances, "steps"),
-    watched = listed_flags(instances, "watched")
+    instance_id = column("instance_id", ""), name = column("name", NA_character_),
+    env_id = column("env_id", ""), num_envs = column("num_envs", NA_integer_),
+    age = column("age_seconds", NA_real_), idle = column("idle_seconds", NA_real_),
+    steps = column("steps", NA_real_), watched = column("watched", NA)
   )
 }

@@ -85,9 +85,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
   single_one <- is.null(num_envs)
   json <- if (single_one) write_value(space, value) else write_batch(single, value, num_envs)
   route <- paste0(instance$route, which, "/contains")
-  member <- post_answer(x, route, c(value = json), call = call)$member
-  if (!rlang::is_bool(member)) refuse_field(member, "member", "true or false")
-  member
+  isTRUE(post_answer(x, route, c(value = json), call = call)$member)
 }
 
 # Environments named by their id ----------------------------------------------------
@@ -100,7 +98,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
 #' @noRd
 known_spaces <- function(env, client, call = rlang::caller_env()) {
   check_environment(env, call = call)
-  if (is_given_by_id(env)) {
+  if (!is.null(given_id(env))) {
     env <- gym_make(env, client = client)
     on.exit(close_quietly(env))
   }

@@ -17,50 +17,6 @@ travels_as_tensors <- function(space, num_envs) {
 
 # Steps ---------------------------------------------------------------------------------
 
-# Makes the function that reads the answer to a step of `n` sub-environments.
-vector_step_reader <- function(instance, read_observation, n, named, infos) {
-  space <- instance$single_observation_space
-  function(answer) {
-    result <- answer$tensors %||% list(
-      reward = read_values(as.numeric(numbers_from_json(answer$reward)), "Its `reward`"),
-      terminated = unlist(answer$terminated), truncated = unlist(answer$truncated)
-    )
-    check_answer_results(result, n)
-    info <- read_info(answer, n)
-    observation <- next_observation <- read_observation(answer)
-    if (length(answer$final_sub_envs)) {
-      final <- final_observations(instance, answer, n, named)
-      if (infos) info$final_obs <- final_by_sub_env(space, final, n)
-      next_observation <- replace_rows(space, observation, n, final$sub_envs, final$values)
-    }
-    list(
-      observation = observation, reward = result$reward,
-      done = result$terminated | result$truncated, info = info,
-      terminated = result$terminated, truncated = result$truncated,
-      next_observation = next_observation
-    )
-  }
-}
-
-# The last observations of the sub-environments whose episode ended in the step: their numbers from
-# 1, and a batch of the observations.
-final_observations <- function(instance, answer, n, named) {
-  ended <- unlist(answer$final_sub_envs)
-  check_final_sub_envs(ended, n)
-  batch <- batch_space(instance$single_observation_space, length(ended))
-  read_final <- observation_reader(batch, naming_of(instance, named), "final_obs")
-  list(sub_envs = ended + 1L, values = read_final(answer))
-}
-
-# A list: the last observation of each sub-environment whose episode ended, NULL for the others.
-final_by_sub_env <- function(space, final, n) {
-  each <- vector("list", n)
-  each[final$sub_envs] <- lapply(seq_along(final$sub_envs), function(i) {
-    batch_value(space, final$values, i)
-  })
-  each
-}
-
 # The server draws an action for each sub-environment.
 decode_sample <- function(instance, json) {
   single <- instance$single_action_space
@@ -73,27 +29,6 @@ decode_sample <- function(instance, json) {
 }
 
 # Checks --------------------------------------------------------------------------------
-
-check_vector_mode <- function(x, choices, num_envs, arg = rlang::caller_arg(x), call) {
-  if (!is.null(x)) {
-    check_choice(x, choices, arg, call)
-    check_has_sub_envs(num_envs, x, arg, call)
-  }
-}
-
-check_num_workers <- function(num_workers, num_envs, call) {
-  check_count(num_workers, min = 0, allow_null = TRUE, call = call)
-  if (!is.null(num_workers)) {
-    check_has_sub_envs(num_envs, num_workers, "num_workers", call)
-  }
-}
-
-check_has_sub_envs <- function(num_envs, x, arg, call) {
-  abort_if(
-    is.null(num_envs), arg, x, call, "`{arg}` is for an environment with sub-environments.",
-    i = "Give their number as `num_envs`."
-  )
-}
 
 check_sub_env_seeds <- function(seed, num_envs, call) {
   right <- is.numeric(seed) && are_whole(seed[!is.na(seed) | is.nan(seed)], 0, largest_seed)

@@ -28,12 +28,14 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
 }
 
 prepare_reset <- function(instance, named, infos) {
-  read_observation <- observation_reader(instance$observations, naming_of(instance, named))
+  name_observation <- if (named) instance$name_observation
   rlang::env(
     sends_tensors = FALSE, fields = info_field(infos),
     content = function(fields, call) fields,
     read = function(answer) {
-      list(observation = read_observation(answer), info = read_info(answer, instance$num_envs))
+      n <- instance$num_envs
+      observation <- read_observation(instance$observations, answer, name_observation)
+      list(observation = observation, info = read_info(answer, n))
     },
     new_message = function(request, layout) reset_message(instance, request, layout, named)
   )
@@ -81,9 +83,8 @@ prepare_step <- function(instance, which, render, named, infos, finals) {
   if (selects) n <- length(which)
   single <- instance$single_action_space
   actions <- sent_space(single, n)
-  read_observation <- observation_reader(
-    sent_space(instance$single_observation_space, n), naming_of(instance, named)
-  )
+  observed <- sent_space(instance$single_observation_space, n)
+  name_observation <- if (named) instance$name_observation
   rlang::env(
     sends_tensors = instance$sends_tensors, which = which,
     fields = c(
@@ -105,11 +106,7 @@ prepare_step <- function(instance, which, render, named, infos, finals) {
         c(action = if (is.null(n)) write_value(single, action) else write_batch(single, action, n))
       }
     },
-    read = if (is.null(n)) {
-      step_reader(read_observation)
-    } else {
-      vector_step_reader(instance, read_observation, n, named, infos)
-    },
+    read = function(answer) read_step(instance, observed, answer, n, name_observation, infos),
     new_message = function(request, layout) {
       step_message(instance, request, layout, n, render, named, infos, finals)
     }
@@ -163,54 +160,72 @@ request_body <- function(request, content) {
 # The field that tells a server to make no infos.
 info_field <- function(infos) if (!infos) c(info = "false")
 
-# Makes the function that reads the answer to a step of a single environment.
-step_reader <- function(read_observation) {
-  function(answer) {
-    if (!is.null(answer$tensors)) {
-      check_answer_results(answer$tensors, 1L)
-      answer[flags_and_reward] <- answer$tensors[flags_and_reward]
-      answer$done <- answer$terminated || answer$truncated
-    }
-    for (name in c("done", "terminated", "truncated")) {
-      flag <- answer[[name]]
-      if (!isTRUE(flag) && !isFALSE(flag)) refuse_field(flag, name, "true or false")
-    }
-    info <- read_info(answer, NULL)
-    observation <- read_observation(answer)
-    reward <- answer$reward
-    if (!is.double(reward) || length(reward) != 1L) reward <- number_from(reward, "reward")
-    list(
-      observation = observation, reward = reward, done = answer$done, info = info,
-      terminated = answer$terminated, truncated = answer$truncated
+#' Read the answer to a step
+#' @param observed The space of the observations.
+#' @param n The number of sub-environments that step, `NULL` for a single environment.
+#' @noRd
+read_step <- function(instance, observed, answer, n, name_observation, infos) {
+  result <- answer$tensors %||% list(
+    reward = read_values(as.numeric(numbers_from_json(answer$reward)), "Its `reward`"),
+    terminated = unlist(answer$terminated), truncated = unlist(answer$truncated)
+  )
+  check_results(result, n %||% 1L)
+  step <- list(
+    observation = read_observation(observed, answer, name_observation), reward = result$reward,
+    done = result$terminated | result$truncated, info = read_info(answer, n),
+    terminated = result$terminated, truncated = result$truncated
+  )
+  if (is.null(n)) {
+    return(step)
+  }
+  step$next_observation <- step$observation
+  # The last observations of the sub-environments whose episode ended in the step.
+  ended <- unlist(answer$final_sub_envs) + 1L
+  if (length(ended)) {
+    space <- instance$single_observation_space
+    last <- read_observation(
+      batch_space(space, length(ended)), answer, name_observation, "final_obs"
     )
+    step$next_observation <- replace_rows(space, step$observation, n, ended, last)
+    if (infos) {
+      # NULL for the other sub-environments.
+      step$info$final_obs <- vector("list", n)
+      step$info$final_obs[ended] <- lapply(seq_along(ended), batch_value, space = space,
+                                           batch = last)
+    }
+  }
+  step
+}
+
+#' @param result A list of `reward`, `terminated` and `truncated`, with `n` elements each.
+#' @noRd
+check_results <- function(result, n) {
+  if (!is.numeric(result$reward) || length(result$reward) != n) {
+    refuse_field(result$reward, "reward", paste(n, "numbers"))
+  }
+  for (name in flags) {
+    if (!is_flags(result[[name]], n)) {
+      refuse_field(result[[name]], name, paste(n, "times true or false"))
+    }
   }
 }
 
-flags_and_reward <- c("reward", "terminated", "truncated")
-
 # Observations -------------------------------------------------------------------------------
 
-naming_of <- function(instance, named) if (named) instance$name_observation
-
-#' Make the function that reads an answer's observations
-#' @param space The observation space.
-#' @param name_observation A function that names them, `NULL` for none.
+#' Read an answer's observations
+#' @param name_observation A function that names them, see [naming()]; `NULL` for none.
 #' @param name The answer's field, or the name of its tensors.
-#' @return A function of a parsed answer.
 #' @noRd
-observation_reader <- function(space, name_observation = NULL, name = "observation") {
-  what <- paste0("Its `", name, "`")
-  function(answer) {
-    observation <- read_values(
-      if (is.null(answer$tensors)) {
-        decode_value(space, answer[[name]])
-      } else {
-        from_tensors(space, name, answer)
-      },
-      what
-    )
-    if (is.null(name_observation)) observation else name_observation(observation)
-  }
+read_observation <- function(space, answer, name_observation = NULL, name = "observation") {
+  observation <- read_values(
+    if (is.null(answer$tensors)) {
+      decode_value(space, answer[[name]])
+    } else {
+      from_tensors(space, name, answer)
+    },
+    paste0("Its `", name, "`")
+  )
+  if (is.null(name_observation)) observation else name_observation(observation)
 }
 
 # The info of an answer. `n` is the number of sub-environments, `NULL` for a single environment.
@@ -219,6 +234,5 @@ read_info <- function(answer, n) {
   if (!length(info)) {
     return(empty_object)
   }
-  check_optional(answer, "info", is_object, "an object")
   if (is.null(n)) info_from_json(info) else read_values(info_by_sub_env(info, n), "Its `info`")
 }

@@ -138,34 +138,19 @@ step_reader_of_numbers <- function(space, n, named) {
   reward_at <- before_numbers + prod(space$shape) + seq_len(rows)
   terminated_at <- reward_at + rows
   truncated_at <- terminated_at + rows
-  check <- function(done) {
+  function(numbers, json = NULL) {
+    terminated <- numbers[terminated_at] != 0
+    truncated <- numbers[truncated_at] != 0
+    done <- terminated | truncated
     if (anyNA(done)) abort_answer("A flag is not a number")
-  }
-  if (is.null(n)) {
-    function(numbers, json = NULL) {
-      terminated <- numbers[[terminated_at]] != 0
-      truncated <- numbers[[truncated_at]] != 0
-      done <- terminated || truncated
-      if (is.na(done)) check(done)
-      list(
-        observation = observe(numbers), reward = numbers[[reward_at]], done = done,
-        info = if (is.null(json)) empty_object else read_info(json, NULL),
-        terminated = terminated, truncated = truncated
-      )
-    }
-  } else {
-    function(numbers, json = NULL) {
-      terminated <- numbers[terminated_at] != 0
-      truncated <- numbers[truncated_at] != 0
-      done <- terminated | truncated
-      check(done)
-      observation <- observe(numbers)
-      list(
-        observation = observation, reward = numbers[reward_at], done = done,
-        info = if (is.null(json)) empty_object else read_info(json, n),
-        terminated = terminated, truncated = truncated, next_observation = observation
-      )
-    }
+    observation <- observe(numbers)
+    result <- list(
+      observation = observation, reward = numbers[reward_at], done = done,
+      info = if (is.null(json)) empty_object else read_info(json, n),
+      terminated = terminated, truncated = truncated
+    )
+    if (!is.null(n)) result$next_observation <- observation
+    result
   }
 }
 

@@ -112,5 +112,3 @@ split_wrappers <- function(wrappers, call) {
   }
   list(server = wrappers[!in_r], r = wrappers[in_r])
 }
-
-calls_r <- function(env) any(wrapper_names(noted_wrappers(env)) %in% names(transforms))

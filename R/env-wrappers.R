@@ -109,13 +109,32 @@ with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
   env_id
 }
 
-# Whether an environment is given by its id, with or without wrappers.
-is_given_by_id <- function(env) is.character(env) || inherits(env, "gym_wrapped")
+#' Look at an environment that is given by its id
+#'
+#' @return `NULL` for an environment that was made. Otherwise a list: `id`, without wrappers;
+#'   `wrappers`, those that [gym_wrap()] has recorded; `remembers`, the names of those whose results
+#'   depend on earlier episodes; `calls_r`, whether one of them calls an R function; `registered`,
+#'   whether it is written in R and registered in this session, which a server cannot know.
+#' @noRd
+given_id <- function(env) {
+  wrapped <- inherits(env, "gym_wrapped")
+  if (!wrapped && !is.character(env)) {
+    return(NULL)
+  }
+  id <- if (wrapped) env$env_id else env
+  wrappers <- if (wrapped) env$wrappers
+  names <- wrapper_names(wrappers)
+  list(
+    id = id, wrappers = wrappers, remembers = remembering(names),
+    calls_r = any(names %in% names(transforms)),
+    registered = rlang::is_string(id) && id %in% names(the_session$environments)
+  )
+}
 
-bare_id <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$env_id else env_id
+is_registered <- function(env) isTRUE(given_id(env)$registered)
 
-# The wrappers that gym_wrap() has recorded for an id.
-noted_wrappers <- function(env_id) if (inherits(env_id, "gym_wrapped")) env_id$wrappers
+# Whether it is given by an id that a server knows.
+is_made_by_server <- function(env) isFALSE(given_id(env)$registered)
 
 wrapper_names <- function(wrappers) vapply(wrappers, function(wrapper) wrapper[[1L]], "")
 

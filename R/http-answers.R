@@ -1,10 +1,10 @@
 # Reads an answer: its JSON or tensors, or the error that it reports.
 
 #' Read an answer or raise the error that it reports
-#' @param response From [with_answer()].
 #' @return The parsed answer, `NULL` for an empty one.
 #' @noRd
 read_answer <- function(response, method, call = rlang::caller_env()) {
+  response <- with_answer(response)
   answer <- response$answer
   if (response$status_code >= 400L) {
     abort_http(response, method, call)
@@ -12,32 +12,31 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   if (response$status_code != 204L && is.null(answer)) {
     abort_no_answer(response, call)
   }
+  check_fields(answer)
   answer
 }
 
-# A response with its parsed `answer`: `NULL` if there is none or it cannot be read; an error of
+# A response with its `answer` as a list: `NULL` if there is none or it cannot be read; an error of
 # this package then says why.
 with_answer <- function(response) {
+  read <- function(content, type) {
+    if (response$status_code == 204L) {
+      NULL
+    } else if (isTRUE(type %in% c(tensors_type, column_tensors_type))) {
+      tensors_answer(content, type == column_tensors_type)
+    } else if (identical(type, "image/png")) {
+      list(png = content)
+    } else {
+      check_json_size(content)
+      json_answer(content)
+    }
+  }
   answer <- tryCatch(
-    parsed_body(response),
+    read(response$content, response$type),
     error = function(cnd) if (inherits(cnd, "gym_error")) rlang::cnd_signal(cnd)
   )
   response["answer"] <- list(answer)
   response
-}
-
-# Returns an answer as a list, NULL for an empty one. An unreadable answer is an error.
-parsed_body <- function(response) {
-  if (response$status_code == 204L) {
-    NULL
-  } else if (isTRUE(response$type %in% c(tensors_type, column_tensors_type))) {
-    tensors_answer(response$content, response$type == column_tensors_type)
-  } else if (identical(response$type, "image/png")) {
-    list(png = response$content)
-  } else {
-    check_json_size(response$content)
-    json_answer(response$content)
-  }
 }
 
 # Returns the answer, or NULL if it is no object. `tensors` is the part that only read_tensors() may
@@ -68,6 +67,105 @@ tensors_answer <- function(bytes, by_column) {
 }
 
 empty_object <- structure(list(), names = character())
+
+# Types ---------------------------------------------------------------------------------------
+
+# The types of the fields that answers may have.
+field_types <- c(
+  env_id = "string", instance_id = "string", vectorization_mode = "string",
+  autoreset_mode = "string", render_mode = "string", processor = "string", server = "string",
+  num_envs = "count", num_workers = "count", group = "count", processes = "count",
+  max_episode_steps = "number", reward_threshold = "number", member = "flag",
+  needs_max_steps = "flag", watched = "flag", all_envs = "object", info = "object", spec = "object"
+)
+type_checks <- list(
+  string = rlang::is_string, count = function(x) is_number(x) && are_whole(x, 0, 2^24),
+  number = function(x) is_json_number(x), flag = rlang::is_bool,
+  object = function(x) is.list(x) && (!length(x) || !is.null(names(x)))
+)
+type_words <- c(
+  string = "a string", count = "a whole number", number = "one number", flag = "true or false",
+  object = "an object"
+)
+
+# Checks all fields of an answer by their names.
+check_fields <- function(answer) {
+  for (name in intersect(names(answer), names(field_types))) {
+    type <- field_types[[name]]
+    value <- answer[[name]]
+    if (!is.null(value) && !type_checks[[type]](value)) {
+      refuse_field(value, name, type_words[[type]])
+    }
+    if (name == "spec") check_fields(value)
+  }
+}
+
+abort_answer <- function(problem, call = NULL) {
+  gym_abort(
+    c("The server's answer is invalid.", x = paste0(problem, ".")),
+    class = "gym_error_connection", problem = problem, call = call
+  )
+}
+
+refuse_field <- function(value, name, must) {
+  abort_answer(paste0("Its `", name, "` is ", describe_value(value), ", not ", must))
+}
+
+#' Read the values of an answer
+#'
+#' A wrong answer can cause various errors in R. They become an error that says what was wrong in
+#' the answer.
+#' @noRd
+read_values <- function(expr, what) {
+  # This runs in each step: tryCatch() takes three times as long as a calling handler.
+  withCallingHandlers(expr, error = function(cnd) {
+    if (!is.null(cnd$problem)) {
+      abort_answer(paste0(what, ": ", cnd$problem))
+    } else if (!inherits(cnd, "gym_error")) {
+      abort_answer(paste0(what, " cannot be read: ", conditionMessage(cnd)))
+    }
+  })
+}
+
+#' Read a column of a table from a list of objects
+#' @param missing The value for an object without the field; it sets the column's type.
+#' @noRd
+listed_column <- function(listed, name, missing) {
+  read_values(
+    vapply(listed, function(one) {
+      value <- one[[name]] %||% missing
+      if (!is.character(value)) {
+        value
+      } else if (is.character(missing)) {
+        shown_line(value)
+      } else {
+        number_from_json(value)
+      }
+    }, missing, USE.NAMES = FALSE),
+    paste0("Its `", name, "`")
+  )
+}
+
+# Values of spaces ----------------------------------------------------------------
+
+check_numbers <- function(values, shape) {
+  # Only words for NaN and the infinities are read as numbers.
+  if (length(values) != prod(shape) || !is.numeric(values) && !is.logical(values)) {
+    abort_answer(paste("A value is not an array of numbers of shape", shape_text(shape)))
+  }
+  values
+}
+
+check_text <- function(value) {
+  if (!rlang::is_string(value)) refuse_field(value, "text", "a string")
+  value
+}
+
+check_list <- function(value, n, what) {
+  if (!is.list(value) || length(value) != n) {
+    abort_answer(paste("A value of", what, "is not a list of", n))
+  }
+}
 
 # Its size ----------------------------------------------------------------------------------
 

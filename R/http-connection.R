@@ -109,18 +109,10 @@ fetch <- function(line, url, call) {
   old <- options(curl_interrupt = FALSE)
   on.exit(options(old))
   suspendInterrupts({
-    response <- response_or_error(url, line$handle)
-    if (inherits(response, "error")) raise_own_stop(response, line$client, call)
+    response <- tryCatch(curl::curl_fetch_memory(url, line$handle), error = identity)
+    raise_own_stop(response, line$client, call)
   })
   whole_response(response)
-}
-
-# tryCatch() would take three times as long.
-response_or_error <- function(url, handle, failure = NULL, failed = return(failure)) {
-  withCallingHandlers(curl::curl_fetch_memory(url, handle), error = function(cnd) {
-    failure <<- cnd
-    failed
-  })
 }
 
 # Adds a request to a pool. `done` gets the response or the connection's error.

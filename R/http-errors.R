@@ -4,7 +4,10 @@ abort_http <- function(response, method, call) {
   status <- response$status_code
   problem <- lapply(
     list(message = "message", code = "code", hint = "hint", extra = "extra"),
-    function(name) shown_text(string_or_null(response$answer[[name]]))
+    function(name) {
+      text <- response$answer[[name]]
+      if (rlang::is_string(text)) shown_text(text)
+    }
   )
   if (identical(problem$code, "unknown_instance")) check_not_restarted(response$url, call)
   request <- paste(method, response$url)

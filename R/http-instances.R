@@ -5,16 +5,14 @@
 # The time for closing in total, in seconds, if nobody waits for it.
 closing_time <- 2
 
-# Creates an instance on the server and remembers it. Returns the answer, with a checked id.
+# Creates an instance on the server and remembers it. Returns the answer.
 create_on_server <- function(client, fields, call) {
   key <- next_key(client_state(client)$keys)
   # An interrupt after the answer must not come before the instance is remembered.
   suspendInterrupts({
     answer <- allowInterrupts(post_answer(client, "/v1/envs/", fields, key, call = call))
-    check_instance_id(answer$instance_id)
-    remember_instance(
-      client, answer$instance_id, shown_line(answer$env_id), string_or_null(answer$server)
-    )
+    if (is.null(answer$instance_id)) refuse_field(NULL, "instance_id", "a string")
+    remember_instance(client, answer$instance_id, shown_line(answer$env_id), answer$server)
   })
   answer
 }

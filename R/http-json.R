@@ -120,30 +120,13 @@ deepest_json <- 320L
 
 # Each level opens and closes a bracket, so a shorter text need not be checked.
 check_json_depth <- function(text) {
-  if (json_depth(text) > deepest_json) {
+  # Brackets in texts do not nest.
+  text <- gsub("\"(?:[^\"\\\\]++|\\\\.)*+\"", "", text, perl = TRUE, useBytes = TRUE)
+  bytes <- as.integer(charToRaw(text))
+  depth <- cumsum(bytes %in% utf8ToInt("[{")) - cumsum(bytes %in% utf8ToInt("]}"))
+  if (any(depth > deepest_json)) {
     abort_answer(paste("Its JSON is nested more than", deepest_json, "levels deep"))
   }
-}
-
-# The nesting depth of a JSON text. It is fast and approximate if there are few brackets.
-json_depth <- function(text) {
-  steps <- bracket_steps(text)
-  if (sum(steps > 0L) <= deepest_json) {
-    return(0L)
-  }
-  # Brackets in texts do not nest.
-  if (grepl("\"", text, fixed = TRUE, useBytes = TRUE)) {
-    text <- gsub("\"(?:[^\"\\\\]++|\\\\.)*+\"", "", text, perl = TRUE, useBytes = TRUE)
-    steps <- bracket_steps(text)
-  }
-  max(0L, cumsum(steps))
-}
-
-# 1 for each opening bracket, -1 for each closing one.
-bracket_steps <- function(text) {
-  bytes <- as.integer(charToRaw(text))
-  bytes <- bytes[bytes %in% utf8ToInt("[]{}")]
-  ifelse(bytes == 0x5bL | bytes == 0x7bL, 1L, -1L)
 }
 
 # Refuses the escaped character NUL, but not an escaped backslash before "u0000".
@@ -169,14 +152,10 @@ numbers_from_json <- function(elements) {
 }
 
 number_from_json <- function(x) {
-  if (is.character(x)) {
-    if (!is_json_number(x)) {
-      abort_answer(paste(describe_value(x), "is not a number"))
-    }
-    switch(x, "NaN" = NaN, "Infinity" = Inf, "-Infinity" = -Inf, as.numeric(x))
-  } else {
-    as.numeric(x)
+  if (is.character(x) && !is_json_number(x)) {
+    abort_answer(paste(describe_value(x), "is not a number"))
   }
+  as.numeric(x)
 }
 
 # Integers beyond 2^53 and numbers that are not finite are sent as text.
@@ -230,29 +209,15 @@ deepest_info <- 160L
 
 is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
 
-# "NaN" and the like are numbers, unless other text is beside them.
 info_vector <- function(x) {
-  kinds <- unique(vapply(x, info_kind, ""))
-  if (all(kinds %in% c("number", "word"))) {
+  all_are <- function(is_kind) all(vapply(x, is_kind, NA))
+  # "NaN" and the like are numbers, unless other text is beside them.
+  if (all_are(function(one) is.numeric(one) || is_number_word(one))) {
     numbers_from_json(x)
-  } else if (identical(kinds, "logical") || all(kinds %in% c("text", "word"))) {
+  } else if (all_are(is.logical) || all_are(is.character)) {
     unlist(x)
   } else {
     lapply(x, info_from_json)
-  }
-}
-
-info_kind <- function(x) {
-  if (is.null(x)) {
-    "null"
-  } else if (is.numeric(x)) {
-    "number"
-  } else if (is.logical(x)) {
-    "logical"
-  } else if (is_number_word(x)) {
-    "word"
-  } else {
-    "text"
   }
 }
 

@@ -335,7 +335,7 @@ read_stream_answer <- function(stream, message, content, call) {
     url = paste0(stream$client$remote_base, stream$route),
     type = if (form == 1L) json_type else column_tensors_type
   )
-  message$request$read(read_answer(with_answer(response), "POST", call))
+  message$request$read(read_answer(response, "POST", call))
 }
 
 #' Send a message by HTTP and wait for its answer
@@ -354,7 +354,7 @@ post_message <- function(stream, message, content, head, number, call) {
   if (identical(response$type, message_type)) {
     read_stream_answer(stream, message, response$content, call)
   } else {
-    message$request$read(read_answer(with_answer(response), "POST", call))
+    message$request$read(read_answer(response, "POST", call))
   }
 }
 

@@ -13,8 +13,57 @@
 #'   strings.
 #' @noRd
 read_tensors <- function(bytes, by_column = FALSE) {
-  layout <- read_layout(bytes, by_column)
+  layout <- read_values(read_layout(bytes, by_column), "Its header")
   list(tensors = read_entries(bytes, layout), metadata = layout$metadata)
+}
+
+# The most tensors, which take some seconds to read.
+most_tensors <- 2^14
+
+#' Read the header of a file
+#'
+#' @return A list: `entries`, the tensors in the order of their bytes; `data`, the number of bytes
+#'   before these; `metadata`.
+#' @noRd
+read_layout <- function(bytes, by_column) {
+  size <- readBin(bytes, "integer", 2L, size = 4L, endian = "little")
+  data <- 8L + size[[1L]]
+  if (size[[2L]] != 0L || length(bytes) < data) abort_answer("The file is shorter than its header")
+  header <- bytes[9L:data]
+  check_json_size(header)
+  json <- from_json(rawToChar(header))
+  entries <- json[names(json) != "__metadata__"]
+  if (length(entries) > most_tensors) {
+    abort_answer(paste("There are more than", count_of(most_tensors, "tensor")))
+  }
+  entries <- lapply(entries, read_entry, by_column)
+  entries <- entries[order(vapply(entries, function(entry) entry$begin, 0))]
+  # With as many bytes as the file, tensors take no more memory than it.
+  size <- sum(vapply(entries, function(entry) as.double(entry$size), 0))
+  if (size != length(bytes) - data) {
+    abort_answer(paste("The tensors have", count_of(size, "byte"), "and the file",
+                       length(bytes) - data))
+  }
+  list(entries = entries, data = data, metadata = json[["__metadata__"]])
+}
+
+read_entry <- function(entry, by_column) {
+  type <- tensor_types[[entry$dtype]]
+  shape <- as.integer(unlist(entry$shape))
+  offsets <- as.double(unlist(entry$data_offsets))
+  n <- prod(shape)
+  size <- offsets[[2L]] - offsets[[1L]]
+  if (size != n * type$size) abort_answer("An offset does not fit its tensor")
+  # R indexes a vector faster by integers than by doubles.
+  whole <- if (offsets[[2L]] <= .Machine$integer.max) as.integer else identity
+  entry <- list(
+    read = type$read, n = n, dim = if (length(shape) > 1L) rev(shape), begin = offsets[[1L]],
+    size = whole(size)
+  )
+  if (!by_column && length(shape) > 1L) {
+    entry$place <- function(values) place_by_row(values, shape)
+  }
+  entry
 }
 
 # Up to this size tensors are read by an index, from a larger file by a connection of R, which

@@ -56,9 +56,7 @@ lock_entry <- function(extras, key) {
   }, "", USE.NAMES = FALSE)
 }
 
-install_root <- function() cache_of("gym")
-
-cache_of <- function(package) absolute_path(tools::R_user_dir(package, "cache"))
+install_root <- function() absolute_path(tools::R_user_dir("gym", "cache"))
 
 environment_folder <- function() file.path(install_root(), lock_hash())
 

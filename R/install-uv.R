@@ -31,7 +31,8 @@ uv_candidates <- function() {
     # For reticulate, "managed" means its own uv.
     if (nzchar(reticulate) && reticulate != "managed") absolute_path(reticulate),
     unname(Sys.which("uv")), file.path(home, ".local", "bin", uv_name()),
-    file.path(cache_of("reticulate"), "uv", "bin", uv_name()), pinned_uv()
+    absolute_path(file.path(tools::R_user_dir("reticulate", "cache"), "uv", "bin", uv_name())),
+    pinned_uv()
   )
   unique(places[file.exists(places) & !dir.exists(places)])
 }

@@ -19,7 +19,7 @@ play_requests <- function(play) {
     },
     received = function(piece, response, seconds) {
       if (response$status_code >= 400L) {
-        error <- response[c("status_code", "url", "answer", "headers", "type")]
+        error <- with_answer(response)[c("status_code", "url", "answer", "headers", "type")]
         return(take_played(play, piece, NULL, error))
       }
       played <- read_played(play, piece, response)

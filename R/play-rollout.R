@@ -157,10 +157,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
                 "`next_observation = TRUE` needs the steps to be kept.", i = "Add `steps = TRUE`.")
   }
   check_flag(frames)
-  check_count(num_envs, allow_null = TRUE)
-  check_count(num_workers, min = 0, allow_null = TRUE)
   check_flag(progress)
-  check_dots_named(list(...), "is_slippery = FALSE")
   candidates <- count_candidates(policy) %||% 1L
   # The numbers of all episodes together are integers.
   most <- .Machine$integer.max %/% candidates

@@ -104,11 +104,11 @@ steps_by_episode <- function(x, arg, call) {
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
-  # NumPy computes the actions of policies that play on the server.
   # The versions of the server and of what simulates the environment, such as MuJoCo: episodes may
   # differ from one version to another.
   versions <- c(server_versions(vector_env$client), vector_env$spec$engine) %||%
     vector_env$model$versions
+  # Such as that of NumPy, which computes the actions of policies that play on the server.
   described <- vector_env$description$versions
   way <- if (!is.null(vector_env$model)) {
     "from the model in R"

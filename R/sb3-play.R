@@ -28,7 +28,7 @@ policy_bind.gym_policy_sb3 <- function(policy, env, call = rlang::caller_env()) 
     return(policy)
   }
   abort_if(
-    is.null(made_of) || !is_made_by_server(made_of$env) || calls_r(made_of$env),
+    is.null(made_of) || !is_made_by_server(made_of$env) || given_id(made_of$env)$calls_r,
     "env", made_of$env, call,
     "A policy of Stable-Baselines3 plays in a Python process, which makes the environment itself.",
     i = "Give the environment's id and its arguments, without wrappers that are R functions."
@@ -54,8 +54,8 @@ sees_game <- function(policy, env, kwargs) {
 sb3_env_job <- function(algorithm, policy, env, kwargs) {
   object <- function(values) if (length(values)) values else rlang::set_names(list())
   list(
-    algorithm = algorithm, env_id = bare_id(env), env_kwargs = object(kwargs),
-    wrappers = lapply(unname(noted_wrappers(env)), function(wrapper) {
+    algorithm = algorithm, env_id = given_id(env)$id, env_kwargs = object(kwargs),
+    wrappers = lapply(unname(given_id(env)$wrappers), function(wrapper) {
       list(name = wrapper[[1L]], kwargs = object(wrapper[-1L]))
     }),
     atari = sees_game(policy, env, kwargs)

@@ -3,48 +3,6 @@
 # single numbers.
 
 #' @exportS3Method
-init_space.gym_space_box <- function(space) {
-  space$shape <- shape_from_json(space$shape)
-  space$low <- bound_from_json(space$low)
-  space$high <- bound_from_json(space$high)
-  n <- prod(space$shape)
-  if (!length(space$low) %in% c(1, n) || !length(space$high) %in% c(1, n)) {
-    abort_answer(paste("A Box of", count_of(n, "number"), "has bounds of another length"))
-  }
-  space
-}
-
-#' @exportS3Method
-init_space.gym_space_multidiscrete <- function(space) {
-  space$shape <- shape_from_json(space$shape)
-  space$nvec <- whole_from_json(space$nvec)
-  space$start <- if (is.null(space$start)) 0L * space$nvec else whole_from_json(space$start)
-  space
-}
-
-#' @exportS3Method
-init_space.gym_space_multibinary <- function(space) {
-  space$shape <- shape_from_json(space$shape)
-  space
-}
-
-shape_from_json <- function(json) {
-  shape <- naturals_from_json(json)
-  if (is.null(shape) || any(shape > .Machine$integer.max)) {
-    refuse_field(json, "shape", "a list of whole numbers")
-  }
-  as.integer(shape)
-}
-
-# Infinite bounds are sent as +-1e100, which classic clients expect.
-bound_from_json <- function(bound) {
-  bound <- as.numeric(numbers_from_json(bound))
-  bound[bound == 1e100] <- Inf
-  bound[bound == -1e100] <- -Inf
-  bound
-}
-
-#' @exportS3Method
 space_label.gym_space_box <- function(space) paste("Box", space$dtype, shape_text(space$shape))
 
 #' @exportS3Method
@@ -61,22 +19,17 @@ space_label.gym_space_multidiscrete <- function(space) {
 #' @exportS3Method
 space_label.gym_space_multibinary <- function(space) paste("MultiBinary", shape_text(space$shape))
 
-# The lower and the upper bound of each element, row by row.
-space_bounds <- function(space) UseMethod("space_bounds")
-
-#' @exportS3Method
-space_bounds.gym_space_box <- function(space) list(low = space$low, high = space$high)
-
-#' @exportS3Method
-space_bounds.gym_space_multidiscrete <- function(space) {
+# The lower and the upper bound of each element, row by row; also of a Discrete space.
+space_bounds <- function(space) {
+  if (inherits(space, "gym_space_box")) {
+    return(list(low = space$low, high = space$high))
+  }
+  if (inherits(space, "gym_space_multibinary")) {
+    n <- prod(space$shape)
+    return(list(low = rep(0, n), high = rep(1, n)))
+  }
   start <- as.double(space$start)
-  list(low = start, high = start + (as.double(space$nvec) - 1))
-}
-
-#' @exportS3Method
-space_bounds.gym_space_multibinary <- function(space) {
-  n <- prod(space$shape)
-  list(low = rep(0, n), high = rep(1, n))
+  list(low = start, high = start + (as.double(space$nvec %||% space$n) - 1))
 }
 
 # Reading ---------------------------------------------------------------------------
@@ -268,23 +221,9 @@ draw_between <- function(low, high) {
 # Discrete: one of n consecutive whole numbers -----------------------------------------------
 
 #' @exportS3Method
-init_space.gym_space_discrete <- function(space) {
-  space$n <- whole_from_json(space$n)
-  space$start <- if (is.null(space$start)) 0L else whole_from_json(space$start)
-  space$dtype <- space$dtype %||% "int64"
-  space
-}
-
-#' @exportS3Method
 space_label.gym_space_discrete <- function(space) {
   from <- if (space$start != 0) paste(" from", whole_text(space$start))
   paste0("Discrete ", whole_text(space$n), from)
-}
-
-#' @exportS3Method
-space_bounds.gym_space_discrete <- function(space) {
-  start <- as.double(space$start)
-  list(low = start, high = start + (as.double(space$n) - 1))
 }
 
 #' @exportS3Method

@@ -2,33 +2,15 @@
 # OneOf has a value of one of them.
 
 #' @exportS3Method
-init_space.gym_space_tuple <- function(space) {
-  space$spaces <- lapply(space$spaces, new_space)
-  space
-}
-
-#' @exportS3Method
-init_space.gym_space_dict <- function(space) {
-  keys <- vapply(space$spaces, function(entry) entry$key, "")
-  space$spaces <- lapply(space$spaces, function(entry) new_space(entry$space))
-  names(space$spaces) <- keys
-  space
-}
-
-#' @exportS3Method
-init_space.gym_space_oneof <- init_space.gym_space_tuple
-
-#' @exportS3Method
 space_label.gym_space_tuple <- function(space) {
   parts <- vapply(space$spaces, space_label, "")
+  keys <- names(space$spaces)
+  if (!is.null(keys)) parts <- paste0(keys, ": ", parts, recycle0 = TRUE)
   paste0(space$name, " (", paste(parts, collapse = ", "), ")")
 }
 
 #' @exportS3Method
-space_label.gym_space_dict <- function(space) {
-  parts <- vapply(space$spaces, space_label, "")
-  paste0("Dict (", paste0(names(space$spaces), ": ", parts, recycle0 = TRUE, collapse = ", "), ")")
-}
+space_label.gym_space_dict <- space_label.gym_space_tuple
 
 #' @exportS3Method
 space_label.gym_space_oneof <- space_label.gym_space_tuple
@@ -37,8 +19,8 @@ space_label.gym_space_oneof <- space_label.gym_space_tuple
 
 #' @exportS3Method
 decode_value.gym_space_tuple <- function(space, json) {
-  check_list(json, length(space$spaces), "Tuple")
-  Map(decode_value, space$spaces, json)
+  check_list(json, length(space$spaces), space$name)
+  map_parts(space, decode_value, in_order(space, json))
 }
 
 #' @exportS3Method
@@ -54,7 +36,12 @@ check_value.gym_space_tuple <- function(space, value, path, call, bounds = FALSE
 
 #' @exportS3Method
 write_value.gym_space_tuple <- function(space, value) {
-  json_array(mapply(write_value, space$spaces, unname(value)))
+  parts <- mapply(write_value, unname(space$spaces), unname(in_order(space, value)))
+  keys <- names(space$spaces)
+  if (is.null(keys)) {
+    return(json_array(parts))
+  }
+  paste0("{", paste0(json_string(keys), ":", parts, recycle0 = TRUE, collapse = ","), "}")
 }
 
 #' @exportS3Method
@@ -63,12 +50,13 @@ space_sample.gym_space_tuple <- function(space) lapply(space$spaces, space_sampl
 # Dict ------------------------------------------------------------------------------
 
 #' @exportS3Method
-decode_value.gym_space_dict <- function(space, json) {
-  check_list(json, length(space$spaces), "Dict")
-  values <- Map(decode_value, unname(space$spaces), json[match(names(space$spaces), names(json))])
-  names(values) <- names(space$spaces)
-  values
-}
+decode_value.gym_space_dict <- decode_value.gym_space_tuple
+
+#' @exportS3Method
+write_value.gym_space_dict <- write_value.gym_space_tuple
+
+#' @exportS3Method
+space_sample.gym_space_dict <- space_sample.gym_space_tuple
 
 #' @exportS3Method
 check_value.gym_space_dict <- function(space, value, path, call, bounds = FALSE) {
@@ -94,16 +82,6 @@ check_value.gym_space_dict <- function(space, value, path, call, bounds = FALSE)
     check_value(space$spaces[[i]], value[[at[[i]]]], path_key(path, keys[[i]]), call, bounds)
   }
 }
-
-#' @exportS3Method
-write_value.gym_space_dict <- function(space, value) {
-  parts <- mapply(write_value, space$spaces, unname(in_order(space, value)))
-  keys <- json_string(names(space$spaces))
-  paste0("{", paste0(keys, ":", parts, recycle0 = TRUE, collapse = ","), "}")
-}
-
-#' @exportS3Method
-space_sample.gym_space_dict <- function(space) lapply(space$spaces, space_sample)
 
 # OneOf -----------------------------------------------------------------------------
 

@@ -64,13 +64,6 @@ stack_values <- function(space, values) {
 # Sequence --------------------------------------------------------------------------
 
 #' @exportS3Method
-init_space.gym_space_sequence <- function(space) {
-  space$space <- new_space(space$space)
-  space$stack <- isTRUE(space$stack)
-  space
-}
-
-#' @exportS3Method
 space_label.gym_space_sequence <- function(space) {
   paste0("Sequence of ", space_label(space$space), if (space$stack) ", stacked")
 }
@@ -101,13 +94,6 @@ space_sample.gym_space_sequence <- function(space) {
 # Graph ------------------------------------------------------------------------------------
 
 # Graph: any number of nodes, of edges between them, and the two nodes of each edge.
-
-#' @exportS3Method
-init_space.gym_space_graph <- function(space) {
-  space$node_space <- new_space(space$node_space)
-  if (!is.null(space$edge_space)) space$edge_space <- new_space(space$edge_space)
-  space
-}
 
 #' @exportS3Method
 space_label.gym_space_graph <- function(space) {
@@ -178,9 +164,6 @@ space_sample.gym_space_graph <- function(space) {
 }
 
 # Text: a string of certain characters ------------------------------------------------------
-
-#' @exportS3Method
-init_space.gym_space_text <- function(space) space
 
 #' @exportS3Method
 space_label.gym_space_text <- function(space) {

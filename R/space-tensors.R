@@ -49,10 +49,14 @@ from_tensors <- function(space, name, answer) UseMethod("from_tensors")
 #' @exportS3Method
 from_tensors.default <- function(space, name, answer) {
   value <- answer$tensors[[name]]
-  if (is.null(value)) {
-    abort_tensors(paste0("there is none with the name \"", name, "\""))
+  shape <- space$shape
+  if (length(value) != prod(shape) || !identical(dim(value), if (length(shape) > 1L) shape)) {
+    abort_answer(paste0(
+      "Its tensor \"", name, "\" has the shape ", shape_text(dim(value) %||% length(value)),
+      ", not ", shape_text(shape %||% integer())
+    ))
   }
-  check_tensor(value, space, name)
+  value
 }
 
 #' @exportS3Method

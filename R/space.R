@@ -5,23 +5,54 @@
 #' Make a space from the server's description
 #' @noRd
 new_space <- function(description) {
-  if (!is.list(description) || !rlang::is_string(description$name)) {
+  kind <- if (is.list(description)) description$name
+  if (!rlang::is_string(kind)) {
     refuse_field(description, "space", "a description with a name")
   }
-  init_space(structure(description, class = space_class(description$name)))
+  if (!kind %in% space_kinds) {
+    gym_abort(paste0("This version of gym does not know the space '", kind, "'."),
+              class = "gym_error_space", call = NULL)
+  }
+  if (kind == "Dict") {
+    keys <- vapply(description$spaces, function(entry) entry$key, "")
+    description$spaces <- stats::setNames(lapply(description$spaces, `[[`, "space"), keys)
+  }
+  for (name in intersect(names(field_readers), names(description))) {
+    value <- description[[name]]
+    if (!is.null(value)) description[[name]] <- field_readers[[name]](value)
+  }
+  counts <- description[["n"]] %||% description[["nvec"]]
+  if (!is.null(counts)) {
+    description$start <- description$start %||% (0L * counts)
+    description$dtype <- description$dtype %||% "int64"
+  }
+  if (kind == "Sequence") description$stack <- isTRUE(description$stack)
+  structure(description, class = space_class(kind))
 }
+
+space_kinds <- c("Box", "Discrete", "MultiDiscrete", "MultiBinary", "Text", "Tuple", "Dict",
+                 "OneOf", "Sequence", "Graph")
+
+# Infinite bounds are sent as +-1e100, which classic clients expect.
+bound_from_json <- function(json) {
+  bound <- as.numeric(numbers_from_json(json))
+  bound[bound == 1e100] <- Inf
+  bound[bound == -1e100] <- -Inf
+  bound
+}
+
+# How the fields of a description are read from JSON. All others stay as they are.
+field_readers <- list(
+  shape = function(json) as.integer(unlist(json)),
+  low = bound_from_json, high = bound_from_json,
+  n = whole_from_json, nvec = whole_from_json, start = whole_from_json,
+  spaces = function(json) lapply(json, new_space),
+  space = new_space, node_space = new_space, edge_space = new_space
+)
 
 space_class <- function(kind) {
   array <- if (kind %in% c("Box", "MultiDiscrete", "MultiBinary")) "gym_space_array"
   c(paste0("gym_space_", tolower(kind)), array, "gym_space")
-}
-
-init_space <- function(space) UseMethod("init_space")
-
-#' @exportS3Method
-init_space.default <- function(space) {
-  gym_abort(paste0("This version of gym does not know the space '", space$name, "'."),
-            class = "gym_error_space")
 }
 
 # As Gymnasium writes them. `$` is fast, because every step reads elements of spaces.

@@ -279,7 +279,8 @@ with_training_env <- function(settings, play, client, call, max_steps = settings
   evaluated <- NULL
   on.exit(if (!is.null(evaluated)) evaluated$close(wait = FALSE))
   play_both <- function(vector_env) {
-    if (calls_r(played$env) && learns_online(settings$agent) && vector_env$num_envs == 1L) {
+    if (isTRUE(given_id(played$env)$calls_r) && learns_online(settings$agent) &&
+          vector_env$num_envs == 1L) {
       # The learner plays in one sub-environment, its evaluations may play in many.
       vector_env$make_evaluated <- function() {
         if (is.null(evaluated)) {

@@ -240,7 +240,7 @@ sampled_model <- function(settings, draws_map, call) {
   model <- settings$model
   needs_server <- c(
     settings$agent$mask, settings$num_workers, settings$callback,
-    intersect(setdiff(how_made(), "max_episode_steps"), names(settings$kwargs))
+    intersect(setdiff(how_made, "max_episode_steps"), names(settings$kwargs))
   )
   by_id <- rlang::is_string(env) && !is_registered(env)
   if (is.null(model) || !settings$may_sample || !by_id || draws_map || length(needs_server)) {
