@@ -41,6 +41,13 @@
 #' (`repeat_action_probability`, 0.25 in the games of version 5). In the history `mean_length`
 #' counts frames.
 #'
+#' For training the vector environment of `ale-py` steps all `num_envs` games in threads, as many as
+#' there are processors. It does not press the fire button after a lost life, and pixels of what
+#' moves can be a little lighter or darker than with AtariWrapper. Wrappers, and arguments of the game
+#' that it lacks, such as `mode`, are for AtariWrapper, which steps one game after another.
+#'
+#' `vignette("solved")` has the time of a training on a GPU.
+#'
 #' # The policy
 #'
 #' A network of full layers becomes a [policy_network()]. It acts in R alone, and [rollout()] plays
@@ -77,8 +84,8 @@
 #'   preset, or `"MlpPolicy"`.
 #' @param env_kwargs The arguments of the environment, a list with names.
 #' @param num_envs The number of sub-environments, a whole number. The default is 1, or that of the
-#'   preset. One process steps them one after another; the network gets all their observations
-#'   together.
+#'   preset. One process steps them one after another (Atari's in threads); the network gets all
+#'   their observations together.
 #' @param normalize Normalise observations and rewards by `VecNormalize`? `FALSE`, the default,
 #'   `TRUE`, or a list of its arguments, such as `list(norm_reward = FALSE)`. The log and all
 #'   evaluations show the original rewards.

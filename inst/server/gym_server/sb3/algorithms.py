@@ -29,7 +29,7 @@ _OPTIMIZERS = {"RMSpropTFLike": RMSpropTFLike}
 
 # They are arguments of learn_sb3() itself, or of Python's objects.
 _NOT_GIVEN = {"self", "policy", "env", "seed", "device", "verbose", "tensorboard_log"}
-_NOT_GIVEN |= {"_init_setup_model", "action_noise", "replay_buffer_class"}
+_NOT_GIVEN |= {"_init_setup_model", "action_noise", "replay_buffer_class", "rollout_buffer_class"}
 
 
 def algorithm(name: str) -> type[BaseAlgorithm]:

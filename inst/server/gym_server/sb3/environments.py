@@ -71,6 +71,14 @@ def single_env(
 
 def vector_env(job: dict[str, Any]) -> VecEnv:
     """Return a vector environment of Stable-Baselines3 for training."""
+    if job["atari"]:
+        # Its errors name what is wrong with the arguments.
+        single_env(job).close()
+        # Only games need ale-py.
+        from gym_server.sb3 import atari
+
+        if not job["wrappers"] and atari.takes(job["env_kwargs"]):
+            return atari.AtariVecEnv(job["env_id"], job["num_envs"], job["env_kwargs"])
     made: VecEnv = DummyVecEnv([lambda: single_env(job, trains=True)] * job["num_envs"])
     return made
 
@@ -100,16 +108,16 @@ def has_limit(job: dict[str, Any]) -> bool:
     return job["atari"] or gymnasium.spec(job["env_id"]).max_episode_steps is not None
 
 
-def preprocessing(job: dict[str, Any], env: VecEnv) -> dict[str, Any] | None:
+def preprocessing(job: dict[str, Any]) -> dict[str, Any] | None:
     """Return what was done to a game for training; None for another environment."""
     if not job["atari"]:
         return None
-    sticky = env.unwrapped.envs[0].spec.kwargs["repeat_action_probability"]
+    of_game = {**gymnasium.spec(job["env_id"]).kwargs, **job["env_kwargs"]}
     ours = {"frame_stack": _STACK, "clip_reward": True, "terminal_on_life_loss": True}
     return {
         **_preprocessing(dict(job["env_kwargs"])),
         **ours,
-        "repeat_action_probability": sticky,
+        "repeat_action_probability": of_game["repeat_action_probability"],
     }
 
 

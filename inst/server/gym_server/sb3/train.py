@@ -14,7 +14,7 @@ import numpy as np
 import sb3_contrib
 import stable_baselines3
 import torch
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Dict
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -22,6 +22,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from gym_server.rollouts.episode import play_episode
 from gym_server.sb3 import algorithms, checkpoints, policies
+from gym_server.sb3.buffers import DeviceRolloutBuffer
 from gym_server.sb3.environments import (
     has_limit,
     normalized,
@@ -56,7 +57,7 @@ def train(job: dict[str, Any], folder: Path, stopping: threading.Event) -> dict[
             "PyTorch finds no GPU here.", 'device = "cpu" trains without.', argument="device"
         )
     env = vector_env(job)
-    treated = preprocessing(job, env)
+    treated = preprocessing(job)
     arguments = algorithms.arguments_of(make, job["arguments"], env.action_space)
     env = normalized(env, job, arguments.get("gamma", 0.99))
     before = checkpoints.state_of(folder)
@@ -102,6 +103,8 @@ def _model(
     seed: int,
 ) -> BaseAlgorithm:
     named: dict[str, Any] = {"seed": seed % 2**31, "device": job["device"], **arguments}
+    if job["algorithm"] in ("PPO", "A2C", "TRPO") and not isinstance(env.observation_space, Dict):
+        named["rollout_buffer_class"] = DeviceRolloutBuffer
     try:
         return make(job["policy"], env, **named)
     except NotImplementedError as failure:
