@@ -25,13 +25,14 @@ class DeviceRolloutBuffer(RolloutBuffer):
         count = self.buffer_size * self.n_envs
         order = torch.as_tensor(np.random.permutation(count), device=self.device)
         if not self.generator_ready:
-            self.tensors = [
+            observations, actions, *numbers = (
                 self.swap_and_flatten(torch.as_tensor(steps, device=self.device))
-                for steps in (self.observations, self.actions.astype(np.float32, copy=False))
-            ] + [
-                self.swap_and_flatten(torch.as_tensor(steps, device=self.device)).flatten()
-                for steps in (self.values, self.log_probs, self.advantages, self.returns)
-            ]
+                for steps in (
+                    *(self.observations, self.actions.astype(np.float32, copy=False)),
+                    *(self.values, self.log_probs, self.advantages, self.returns),
+                )
+            )
+            self.tensors = [observations, actions, *(steps.flatten() for steps in numbers)]
             self.generator_ready = True
         for chosen in order.split(batch_size or count):
-            yield RolloutBufferSamples(*(steps[chosen] for steps in self.tensors))
+            yield RolloutBufferSamples(*(steps.index_select(0, chosen) for steps in self.tensors))
