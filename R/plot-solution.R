@@ -243,8 +243,9 @@ value_points <- function(data) {
         ggplot2::facet_wrap(
           ggplot2::vars(.data$panel), ncol = 1L, scales = "free_y", labeller = wrapped_strips(1)
         ),
+        # The last of the points are of the actions.
         ggplot2::geom_blank(
-          data = replace(utils::tail(points, 2L), "value", range(data$numbers))
+          data = replace(points[rep(nrow(points), 2L), ], "value", range(data$numbers))
         )
       )
     }) +

@@ -116,6 +116,14 @@ test_that("without a grid the actions have a panel, and a row each", {
                    "action (0 stay, 1 go)")
 })
 
+test_that("a bandit, which has one state, has all its actions in their panel", {
+  bandit <- data.frame(state = 0, action = 0:2, next_state = 1, reward = c(1, 0, 5))
+  solved <- solve_mdp(gym_model(transform(bandit, probability = 1, terminated = TRUE), start = 0))
+  panels <- ggplot2::ggplot_build(drawn(autoplot(solved)))$layout$panel_params
+  expect_gt(panels[[1]]$y.range[[1]], 2)
+  expect_lt(panels[[2]]$y.range[[1]], 0)
+})
+
 test_that("any solution is drawn, and a wrong grid, direction or step refused", {
   limited <- solve_mdp(walk_model(), horizon = 3)
   expect_match(drawn(autoplot(limited))$labels$subtitle, "best values of states within 3 steps")
