@@ -1,11 +1,11 @@
 #' Write frames as a GIF file
 #'
-#' Each frame keeps only the part that differs from the one before. With whole frames ImageMagick
-#' would need a gigabyte for an episode of CartPole, more than many systems allow.
+#' Writes only the part of each frame that differs from the frame before. With whole frames,
+#' ImageMagick needs a gigabyte for an episode of CartPole, and many systems allow less.
 #'
 #' @param pngs A list of PNG files, each a raw vector, all of one size.
 #' @param delays The time for each frame, in hundredths of a second.
-#' @param width The width in pixels; `NULL` for the frames' own.
+#' @param width The width in pixels. `NULL` keeps the width of the frames.
 #' @return The size of the frames in pixels, width and height.
 #' @noRd
 write_gif <- function(pngs, file, delays, width = NULL) {
@@ -15,12 +15,12 @@ write_gif <- function(pngs, file, delays, width = NULL) {
     image <- magick::image_background(magick::image_read(pngs[[i]]), "white")
     if (!is.null(width)) image <- magick::image_scale(image, as.character(width))
     pixels <- magick::image_data(image, "rgb")
-    # A part keeps its place and its delay, and stays until the next one covers it.
+    # With `dispose = "none"` a part stays on the screen until a later part covers it.
     image <- magick::image_animate(image, delay = delays[[i]], dispose = "none")
     part <- changed_part(before, pixels)
     area <- magick::geometry_area(part$width, part$height, part$x, part$y)
-    # The colour space of GIF files. From any other one ImageMagick would choose colours again, with
-    # dithering, in 128 MB and a tenth of a second per frame.
+    # GIF files are in sRGB. From any other colour space, ImageMagick would choose the colours of
+    # each frame a second time, with dithering, which takes 128 MB and a tenth of a second.
     parts[[i]] <- magick::image_quantize(
       magick::image_crop(image, area, repage = FALSE), max = 256, colorspace = "sRGB",
       dither = FALSE
@@ -34,8 +34,8 @@ write_gif <- function(pngs, file, delays, width = NULL) {
 
 #' Find the smallest rectangle that contains all differences of two frames
 #' @param before,now Raw arrays of channels x width x height.
-#' @return A list: `x`, `y` (the first column and row, from 0), `width`, `height`; a single pixel if
-#'   nothing differs, the whole frame if there is none before.
+#' @return A list: `x`, `y` (the first column and row, from 0), `width`, `height`. It is a single
+#'   pixel if nothing differs, and the whole frame if `before` is `NULL`.
 #' @noRd
 changed_part <- function(before, now) {
   size <- dim(now)[2:3]
@@ -51,19 +51,19 @@ changed_part <- function(before, now) {
 
 # MP4 -------------------------------------------------------------------------------------
 
-# Episodes as MP4 files, written by the package av or by the program ffmpeg, which the server's
-# extra "video" includes.
+# The package av writes MP4 files. Without it, the program ffmpeg does, which the server's extra
+# "video" includes.
 
 #' Write frames as an MP4 file
 #' @param fps The number of frames per second.
 #' @inheritParams write_gif
-#' @return The size of the frames in pixels, width and height, which are even in most videos.
+#' @return The width and the height of the video in pixels. The format yuv420p needs even numbers.
 #' @noRd
 write_mp4 <- function(pngs, file, fps, width = NULL, call) {
   folder <- temporary_file()
   dir.create(folder)
   on.exit(unlink(folder, recursive = TRUE))
-  # The last frame stays for a second.
+  # Repeat the last frame, so that it stays for a second.
   shown <- c(seq_along(pngs), rep(length(pngs), max(0, round(fps) - 1)))
   pictures <- file.path(folder, sprintf("%06d.png", seq_along(shown)))
   Map(writeBin, pngs[shown], pictures)
@@ -88,7 +88,8 @@ write_mp4 <- function(pngs, file, fps, width = NULL, call) {
 
 is_av_there <- function() requireNamespace("av", quietly = TRUE)
 
-# The system's program, or that of the Python that runs, or would run, the session's server.
+# Finds the system's ffmpeg. If there is none, looks in the Pythons of the session's servers, of the
+# installed server and of GYM_PYTHON.
 find_ffmpeg <- function() {
   found <- unname(Sys.which("ffmpeg"))
   if (nzchar(found)) {

@@ -1,24 +1,25 @@
 #' Make an animation of an episode
 #'
 #' Write an episode as an animated GIF file or an MP4 video. A rollout must have been played with
-#' `frames = TRUE`; for a search, a training or a policy, a new episode is played. Printing the
-#' result in an interactive session opens it in RStudio's viewer or else in the browser
-#' (`options(gym.viewer = )` sets another function, or `FALSE`). A knitr document shows it on the
-#' page, or, with LaTeX, as a [filmstrip][plot.gym_rollout()]. If the file has gone, as a temporary
-#' one has in another session, a GIF is drawn again from the stills.
+#' `frames = TRUE`. For a search, a training or a policy, `animate()` plays a new episode. Printing
+#' the result in an interactive session opens the file in RStudio's viewer, or in the browser if
+#' there is no viewer. `options(gym.viewer = )` sets another function, or `FALSE` to open nothing. A
+#' knitr document shows the animation on the page; with LaTeX it shows a
+#' [filmstrip][plot.gym_rollout()]. A temporary file is deleted at the end of its session. If the
+#' file is gone, printing draws a GIF again from the stills in the result.
 #'
 #' A GIF requires the package magick. An MP4 requires the package av, or the program ffmpeg, which
 #' the server's extra `"video"` includes (see [gym_server_install()]).
 #'
-#' The animation has the environment's own speed. A GIF counts in hundredths of a second, and
-#' browsers show delays of less than two of them as ten. A GIF therefore has at most 50 frames a
-#' second; faster environments show every second frame or fewer.
+#' The animation has the environment's own speed. Browsers slow down a GIF that has more than 50
+#' frames a second. For a faster environment, the GIF therefore shows only every second frame, or
+#' fewer.
 #'
 #' @param x A rollout, a search, a training, or a policy as for [rollout()].
 #' @param file The file to write; its name ends in `.gif` or `.mp4`. `NULL`, the default, is a
 #'   temporary GIF file.
 #' @param fps The number of steps per second, a number. `NULL`, the default, uses the environment's
-#'   own (50 in CartPole; 30 if it has none).
+#'   own speed (50 in CartPole; 30 if it has none).
 #' @param ... For methods.
 #' @param episode The episode of the rollout to show, a whole number. The default is the first.
 #' @param candidate The candidate whose episode to show, if several policies were played, a whole
@@ -26,17 +27,17 @@
 #' @param width The width in pixels, a whole number. `NULL`, the default, is that of the
 #'   environment's frames (600 in CartPole). In an MP4, width and height are even.
 #' @param every Show every frame (1), every second one (2), and so on, at the same speed. The last
-#'   one is always shown. `NULL`, the default, shows as many as the format allows at that speed. A
-#'   smaller number is raised to that, with a message.
+#'   frame is always shown. `NULL`, the default, shows as many frames as the format allows at that
+#'   speed. If `every` is too small for that, a larger number is used, with a message.
 #' @param seed A whole number that fixes the episode played, as in [rollout()].
-#' @param env,max_steps,client What to play in, as in [rollout()].
+#' @param env,max_steps,client The environment, the step limit and the client, as in [rollout()].
 #' @return An object of class `gym_animation`, a list of `file` (its path, a string), `steps` (the
 #'   number of steps before each frame, integers), `delays` (how long each is shown, in hundredths
 #'   of a second, integers; a second for the last), `size` (width and height in pixels) and
 #'   `stills`, the frames of a filmstrip, at most 8.
 #' @section Errors: `gym_error_argument` for an invalid argument, a rollout without frames, an
-#'   environment that cannot be drawn, or if the software that writes the file is missing. Those of
-#'   [rollout()] while it plays.
+#'   environment that cannot be drawn, or if the software that writes the file is missing. Playing
+#'   an episode can raise the errors of [rollout()].
 #' @seealso [plot.gym_rollout()] for a filmstrip on paper.
 #' @export
 #' @examplesIf gym:::can_start_server() && requireNamespace("magick", quietly = TRUE)
@@ -45,7 +46,7 @@
 #' played <- rollout("CartPole-v1", follow_pole, seed = 1, frames = TRUE)
 #' animate(played, width = 300)
 #'
-#' # The policy that a search has found, in a fresh episode.
+#' # Play a new episode with the policy that a search found.
 #' search <- search_random("CartPole-v0", seed = 1)
 #' animate(search, seed = 1, width = 300, every = 4)
 animate <- function(x, file = NULL, fps = NULL, ...) UseMethod("animate")
@@ -75,7 +76,8 @@ animate.gym_training <- function(x, file = NULL, fps = NULL, ..., seed = NULL, w
                                  every = NULL, client = x$client %||% gym_client()) {
   check_dots_empty(...)
   check_found(x)
-  # Not exec(), which would start a server for an environment that needs none.
+  # exec() would evaluate `client` first, and so start a server that an environment in R does not
+  # need.
   animate_episode(
     rlang::inject(rollout(
       x$env %||% x$env_id, x$policy, max_steps = x$max_steps, seed = seed, client = client,
@@ -100,9 +102,9 @@ animate.gym_policy <- function(x, file = NULL, fps = NULL, ..., env, seed = NULL
 #' @export
 animate.function <- animate.gym_policy
 
-# gganimate has a generic function of the same name. `animate()` finds these methods whichever of
-# the two packages was attached last. They are registered when gganimate is loaded, so it need not
-# be installed.
+# gganimate has a generic function of the same name. Register these methods for it as well, so that
+# `animate()` finds them whichever of the two packages was attached last. The registration waits
+# until gganimate is loaded, because gganimate may not be installed.
 register_with_gganimate <- function() {
   register <- function(...) register_animate(asNamespace("gganimate"))
   if (isNamespaceLoaded("gganimate")) register()
@@ -153,8 +155,8 @@ episode_frames <- function(x, episode = 1, candidate = 1, call = rlang::caller_e
   x$frames[[row]]
 }
 
-# Makes an animation of the rollout that `code` plays. Its arguments stay there: one of an
-# environment's own may be `width`.
+# Makes an animation of the rollout that `code` plays. `code` is a whole call, because an
+# environment may have an argument named `width`, too.
 animate_episode <- function(code, file, fps, width, every, call = rlang::caller_env()) {
   file <- check_animation(file, fps, width, every, call)
   played <- naming_own_call(code, "rollout", call)
@@ -162,13 +164,13 @@ animate_episode <- function(code, file, fps, width, every, call = rlang::caller_
 }
 
 new_animation <- function(frames, file, fps, width, every, call = rlang::caller_env()) {
-  # The environment's metadata, which may be anything, has the number of frames per second.
+  # The environment's author wrote the number of frames per second, so it may be anything.
   own <- attr(frames, "fps")
   fps <- fps %||% if (is_number(own) && own > 0) own else 30
   video <- is_mp4(file)
   plan <- animation_plan(length(frames), fps, every, if (video) Inf else fastest_fps)
   pngs <- unclass(frames)[plan$steps + 1L]
-  # An interrupt leaves an existing file as it was.
+  # Write a temporary file first, so that an interrupt leaves an existing file as it was.
   written <- temporary_file(fileext = if (video) ".mp4" else ".gif")
   size <- if (video) {
     write_mp4(pngs, written, fps / (every %||% 1), width, call)
@@ -193,13 +195,13 @@ new_animation <- function(frames, file, fps, width, every, call = rlang::caller_
 #'   second, rounded so that errors do not add up.
 #' @noRd
 animation_plan <- function(n, fps, every = NULL, fastest = fastest_fps) {
-  # Show one in this many frames: at least so many that the speed can be kept.
+  # The smallest `every` that keeps the speed within the format's limit.
   least <- max(1, ceiling(fps / fastest))
   if (!is.null(every) && every < least) {
     rlang::inform(
-      c(paste0("`every` is ", least, " instead of ", every, ": of ", number_text(fps),
-               " frames a second a GIF can show ", fastest, " at most."),
-        i = "With a lower `fps` it shows more of them, at a slower pace."),
+      c(paste0("`every` is ", least, " instead of ", every, ", because a GIF can show at most ",
+               fastest, " frames a second, and there are ", number_text(fps), "."),
+        i = "A lower `fps` shows more of the frames, at a slower pace."),
       class = "gym_message_every"
     )
   }
@@ -226,7 +228,7 @@ print.gym_animation <- function(x, ...) {
   invisible(x)
 }
 
-# A temporary file ends with its session, but saveRDS() and knitr's cache keep the object.
+# saveRDS() and knitr's cache keep the object for longer than a temporary file lives.
 redrawn_if_gone <- function(x, call = rlang::caller_env()) {
   if (file.exists(x$file)) {
     return(x)
@@ -265,7 +267,7 @@ format.gym_animation <- function(x, ...) {
   )
 }
 
-# The file gets knitr's name, in the folder of the document's figures. LaTeX cannot show it, so it
+# Copies the file into the folder of the document's figures. LaTeX cannot show an animation, so it
 # gets a filmstrip.
 #' @exportS3Method knitr::knit_print
 knit_print.gym_animation <- function(x, options = knitr::opts_current$get(), ...) {

@@ -1,7 +1,7 @@
 #' Evaluate a policy with data from another policy
 #'
-#' Estimate the value of a policy from steps of another policy: the expected discounted return of
-#' the policy, averaged over the first states of the data's episodes.
+#' Estimate the value of a policy without playing it, from steps that another policy took. The value
+#' is the expected discounted return, averaged over the first states of the episodes in the data.
 #'
 #' # Methods
 #'
@@ -10,30 +10,30 @@
 #' | method | estimate | source |
 #' |---|---|---|
 #' | `"fqe"` | fitted Q evaluation: values of the policy by a regression | Le 2019 |
-#' | `"is"` | returns, weighted by how much likelier they are under the policy | Precup 2000 |
+#' | `"is"` | returns, weighted by how much likelier the policy makes them | Precup 2000 |
 #' | `"wis"` | the same, with weights that add up to 1 | Precup 2000 |
-#' | `"pdis"` | as `"is"`, with the weight of each decision until then | Precup 2000 |
+#' | `"pdis"` | as `"is"`, but each reward has the weight of the decisions up to it | Precup 2000 |
 #' | `"dr"` | the regression, corrected by weighted residuals (doubly robust) | Jiang and Li 2016 |
 #' | `"wdr"` | the same, with weights that add up to 1 at each step | Thomas and Brunskill 2016 |
 #'
 #' Importance sampling needs the correct probabilities of the actions in the data. Fitted Q
-#' evaluation needs a correct regression. The doubly robust methods need one of the two. Their
-#' regression is fitted without the episodes whose values it predicts (five folds). If episodes were
-#' cut off, the rewards after the cut are unknown: methods with weights then need a `horizon` that
-#' is no longer than the shortest of these episodes.
+#' evaluation needs a correct regression. The doubly robust methods need only one of the two to be
+#' correct. They predict the values of each episode by a regression on other episodes (five folds).
+#' If episodes were cut off, nobody knows the rewards after the cut. All methods but `"fqe"` then
+#' need a `horizon` that is no longer than the shortest of these episodes.
 #'
-#' All methods are biased if something that is not in the data influenced both actions and rewards
+#' All methods are biased if something influenced both actions and rewards and is not in the data
 #' (confounding).
 #'
 #' # Intervals
 #'
-#' The bootstrap draws as many episodes as there are, with replacement, `replicates` times, and
-#' takes percentiles of the estimates. The interval is widened a little, because percentile
-#' intervals of few episodes are too short (the expanded percentile interval, Hesterberg 2015).
-#' `"fqe"` fits its regression again each time, `"wis"` and `"wdr"` normalise their weights, and an
-#' estimated model of behavior is estimated again; `"dr"` and `"wdr"` keep their regression.
-#' `interval = "t"` uses the mean and the standard error over episodes instead, for `"is"`, `"pdis"`
-#' and `"dr"` with known probabilities.
+#' The bootstrap draws episodes with replacement, as many as there are, and estimates the value
+#' again. It does so `replicates` times and takes percentiles of the estimates. The interval is
+#' widened a little, because percentile intervals of few episodes are too short (the expanded
+#' percentile interval, Hesterberg 2015). Each time, `"fqe"` fits its regression again, `"wis"` and
+#' `"wdr"` normalise their weights again, and a model of behavior is estimated again if there is
+#' one. `"dr"` and `"wdr"` keep their regression. `interval = "t"` uses the mean and the standard
+#' error over episodes instead. It is for `"is"`, `"pdis"` and `"dr"` with known probabilities.
 #'
 #' @inheritParams learn_fitted_q
 #' @param policy The policy: the result of [learn_fitted_q()] or [learn_q()]; any other policy, such
@@ -42,14 +42,16 @@
 #'   is then always taken. Actions of several parts are data frames with the columns of the parts.
 #' @param method The methods, strings. The default is all of them.
 #' @param behavior How the actions of the data were chosen: a formula of the state, such as `~
-#'   severity + age`, for a logistic regression on these columns; or a policy as `policy`. `NULL`,
-#'   the default, uses the column `probability`, or if there is none the shares of actions in each
-#'   state where the state is countable, and otherwise a logistic regression on all columns.
+#'   severity + age`, for a logistic regression on these columns; or a policy, in the forms that
+#'   `policy` may have. `NULL`, the default, uses the column `probability`. Without this column, it
+#'   uses the shares of actions in each state if states can be counted, and otherwise a logistic
+#'   regression on all columns.
 #' @param formula,model The regression of values, as for [learn_fitted_q()].
 #' @param level The level of the intervals, a number between 0 and 1. The default is 0.95.
-#' @param folds `NULL`, the default; or a number of folds for a policy that was learned from the
-#'   same data. It is learned again without the episodes of each fold and evaluated on these. The
-#'   result estimates the mean value of these rules.
+#' @param folds `NULL`, the default; or a number of folds, if the policy was learned from the same
+#'   data. For each fold, the policy is learned again without the episodes of this fold, and then
+#'   evaluated on these episodes. The result estimates the mean value of the policies learned in
+#'   this way.
 #' @param interval `"bootstrap"`, the default, or `"t"`.
 #' @param replicates The number of bootstrap replicates, a whole number. The default is 1,000.
 #' @param seed A whole number that fixes folds and replicates. `NULL`, the default, draws one from
@@ -59,15 +61,15 @@
 #'   \describe{
 #'     \item{estimates}{A data frame with a row for each method: `method`, `estimate`, `se`, `lower`
 #'       and `upper`. `as.data.frame()` returns it.}
-#'     \item{observed}{The same for the policy of the data, from its returns: `NA` without a horizon
-#'       if episodes were cut off.}
-#'     \item{weights}{The weight of each episode, the ratio of the probabilities of all its actions;
-#'       `NULL` for `"fqe"` alone.}
+#'     \item{observed}{The same for the policy that took the steps, from its returns. `NA` if
+#'       episodes were cut off and there is no horizon.}
+#'     \item{weights}{The weight of each episode: the probability of all its actions under the
+#'       policy, divided by that in the data. `NULL` if the only method is `"fqe"`.}
 #'     \item{effective}{The effective number of episodes, `sum(weights)^2 / sum(weights^2)`.}
 #'     \item{replicates}{A matrix with a row for each replicate and a column for each method, or
 #'       `NULL`.}
-#'     \item{episodes, steps, discount, horizon, level, folds, seed, model, behavior}{As given, or
-#'       what was used, in words.}
+#'     \item{episodes, steps, discount, horizon, level, folds, seed, model, behavior}{The arguments
+#'       as given, or a description of what was used.}
 #'   }
 #' @section Errors: `gym_error_argument` for invalid arguments, actions that the data never took,
 #'   cut episodes without a horizon, a policy that was learned from the same episodes, or fewer than
@@ -118,7 +120,7 @@ evaluate_offline <- function(data, policy, method = c("fqe", "is", "wis", "pdis"
   check_interval(interval, method, chosen, call)
   design <- list(
     steps = steps, discount = discount, horizon = horizon, stages = stages, fold = fold,
-    # Weights add up to 1, and values are of one rule, in each stratum.
+    # In each stratum weights add up to 1, and all values are of the same policy.
     stratum = if (is.null(folds)) rep(1L, steps$episodes) else fold, act = act,
     regression = if (any(c("fqe", "dr", "wdr") %in% method)) {
       regression_of(steps, formula, model, call)
@@ -199,7 +201,7 @@ check_pairs <- function(design) {
     rlang::warn(
       c(paste0("In ", percent_text(share), " of the steps the policy takes an action that the ",
                "data never took in that state."),
-        i = "For these the table has no value and counts 0: give a `formula` or a `model`."),
+        i = "The table counts 0 for such an action. Give a `formula` or a `model`."),
       class = "gym_warning_offline", call = design$call
     )
   }
@@ -211,7 +213,7 @@ warn_few_episodes <- function(result) {
     rlang::warn(
       c(paste0("The weighted estimates depend on few episodes: ",
                whole_number_text(result$episodes), " count as ", number_text(result$effective),
-               ", and one has ", percent_text(largest), " of the weight."),
+               ", and one episode has ", percent_text(largest), " of the weight."),
         i = "The policy differs too much from the data's, or the `horizon` is too long."),
       class = "gym_warning_offline"
     )
@@ -246,8 +248,9 @@ new_offline <- function(design, method, parts, estimates, draws, level) {
   )
 }
 
-# A bootstrap percentile interval of few episodes is too short: for a mean it is that of the normal
-# distribution, with a variance divided by n instead of n - 1. This corrects it (Hesterberg 2015).
+# A bootstrap percentile interval of few episodes is too short. For a mean it is the interval of a
+# normal distribution whose variance is divided by n instead of n - 1. Wider percentiles correct
+# this (Hesterberg 2015).
 bootstrap_tail <- function(design, level) {
   n <- design$steps$episodes
   strata <- length(unique(design$stratum))

@@ -1,54 +1,55 @@
 #' Learn a rule from data
 #'
-#' Fitted Q-iteration: regress the reward, plus the discounted value of the best action in the next
-#' state, on the state and the action, again and again, until the values do not change any more
-#' (Ernst, Geurts and Wehenkel 2005). With a horizon it goes backwards from the last step, which is
-#' Q-learning for dynamic treatment regimes (Murphy 2005). [learn_q()] does the same with a table.
+#' Learn the value of each action from logged steps, by fitted Q-iteration (Ernst, Geurts and
+#' Wehenkel 2005). It fits a regression on the state and the action. The response is the reward plus
+#' the discounted value of the best action in the next state. The next regression uses the new
+#' values, until the values do not change any more. With a horizon it goes backwards from the last
+#' step, which is Q-learning for dynamic treatment regimes (Murphy 2005). [learn_q()] does the same
+#' with a table.
 #'
 #' # Models
 #'
 #' Without `formula` and `model`, values are means in a table if all columns of the state are text,
-#' factors, logical values or integers, and there are at least five steps for each pair of a state
-#' and an action. Otherwise it is [lm()] with coefficients of its own for each action. `formula`
-#' replaces its terms, as in `~ action * (age + severity)`.
+#' factors, logical values or integers, and there are on average at least five steps for each pair
+#' of a state and an action. Otherwise values come from a linear model, [lm()], in which each action
+#' has its own coefficients. `formula` replaces its terms, as in `~ action * (age + severity)`.
 #'
-#' Any other model is given as a function of a formula and data that returns an object which
-#' [predict()] knows, such as `rpart::rpart`, `mgcv::gam` or
-#' `function(formula, data) nnet::nnet(formula, data, size = 5, linout = TRUE)`. In the data the
-#' action is a factor.
+#' `model` sets another kind of model: a function of a formula and data that returns an object with
+#' a method of [predict()], such as `rpart::rpart`, `mgcv::gam` or `function(formula, data)
+#' nnet::nnet(formula, data, size = 5, linout = TRUE)`. In the data the action is a factor.
 #'
 #' # Stages
 #'
-#' With a horizon there are values for each step. By default they are computed from all steps, which
-#' is right if the next state and the reward depend on the state and the action alone. With
-#' `stages = TRUE` each step has a model of its own, fitted to this step of all episodes: for data
-#' in which the first treatment works differently from the second. Without it, the number of the
-#' stage can be a part of the state.
+#' With a horizon there are values for each step. By default all steps are used to compute them,
+#' which is right if the next state and the reward depend only on the state and the action. With
+#' `stages = TRUE` each step has its own model, fitted to this step of all episodes. Use it if, say,
+#' the first treatment works differently from the second. Another way is to make the number of the
+#' stage a part of the state.
 #'
 #' @param data Steps: the result of [steps_data()], a data frame with its columns, or a [rollout()]
 #'   with `steps = TRUE`.
-#' @param formula A formula with `action` and columns of the state on its right side; of an action
-#'   with several parts also the columns of these, such as `action_dose`. `NULL`, the default, is
-#'   described below.
+#' @param formula A formula with `action` and columns of the state on its right side. If an action
+#'   has several parts, it may also have their columns, such as `action_dose`. `NULL`, the default,
+#'   is described below.
 #' @param model A function of a formula and data that fits a model. `NULL`, the default, is
 #'   described below.
 #' @param discount The discount, a number above 0 and at most 1, the default.
-#' @param iterations The largest number of regressions, a whole number. The default is 100. It stops
-#'   earlier if no value changes by more than 1e-12 of its size.
+#' @param iterations The largest number of regressions, a whole number. The default is 100. Learning
+#'   stops earlier if no value changes by more than 1e-12 of its size.
 #' @param horizon The number of steps after which everything ends, a whole number. `NULL`, the
-#'   default, for the end of the episode.
+#'   default, goes on to the end of the episode.
 #' @param stages Does each step have its own model? `FALSE`, the default, or `TRUE`, which requires
 #'   a `horizon`.
 #' @param double Use double Q-learning? `FALSE`, the default, or `TRUE`: each half of the episodes
-#'   chooses the best actions for the other half, whose values are then not too large by chance (van
-#'   Hasselt 2010).
+#'   chooses the best actions, and the other half values them. This avoids values that are too large
+#'   by chance (van Hasselt 2010).
 #' @return A policy of class `gym_policy_fitted`. [predict()][predict.gym_policy()] takes a data
-#'   frame of states and returns their actions (a data frame, if an action has several parts), with
-#'   `type = "output"` the values of all actions.
-#'   [rollout()] plays it. With a horizon `predict()` needs the column `step`, too. [rollout()]
-#'   counts the steps of each episode, and goes on as in the last step after the horizon.
-#'   [state_values()] returns the values of the states of the data. It takes the most frequent
-#'   action where the data does not tell.
+#'   frame of states and returns their actions (a data frame, if an action has several parts). With
+#'   `type = "output"` it returns the values of all actions. [rollout()] plays it. With a horizon,
+#'   `predict()` also needs the column `step`. [rollout()] counts the steps of each episode itself;
+#'   after the horizon it acts as in the last step. In a state that the data does not have, the
+#'   policy takes the most frequent action. [state_values()] returns the values of the states in the
+#'   data.
 #' @section Errors: `gym_error_argument` for invalid steps, a formula with unknown columns, or a
 #'   model that cannot be fitted.
 #' @references D. Ernst, P. Geurts, L. Wehenkel (2005), Tree-based batch mode reinforcement
@@ -80,7 +81,8 @@ learn_fitted_q <- function(data, formula = NULL, model = NULL, discount = 1, ite
   fit_rule(steps, recipe, call)
 }
 
-# Batch Q-learning on a table, for learn_q(): sweeps over all pairs that the data has.
+# Batch Q-learning on a table, for learn_q(): sweeps over all pairs of a state and an action in the
+# data.
 learn_table <- function(data, discount, double, iterations, call) {
   steps <- steps_of(data, call)
   recipe <- list(
@@ -111,8 +113,8 @@ fit_rule <- function(steps, recipe, call) {
   }
   prepared <- prepare_steps(steps, regression, recipe$stages)
   prepared <- weigh_steps(prepared, rep(1, length(steps$step)))
-  # A sweep needs the values of all states, other updates those of each step's next state. A table
-  # computes each of these once.
+  # A sweep over a table computes the value of each state once. Other updates compute the value of
+  # each step's next state.
   sweep <- if (recipe$table && !recipe$double) table_sweep(prepared, regression, recipe$discount)
   after <- prepared$after
   if (!is.null(regression$states)) after <- unique(after)
@@ -134,7 +136,7 @@ fit_rule <- function(steps, recipe, call) {
   new_rule(regression, fits, steps, recipe)
 }
 
-# `recipe` has the arguments by which it is learned again in folds, if it can be.
+# `recipe` has the arguments that learn the rule again for folds, if that is possible.
 new_rule <- function(regression, fits, steps, recipe) {
   structure(
     list(
@@ -154,7 +156,8 @@ prepare_steps <- function(steps, regression, stages) {
   steps
 }
 
-# Steps of a table that start and end in the same way become one. `group` tells which.
+# In a table, steps with the same start and end become one. `group` says which one each step belongs
+# to.
 equal_steps_together <- function(prepared) {
   each <- c("rows", "after", "ends", "known", if (prepared$stages) "step")
   key <- do.call(paste, prepared[each])
@@ -176,9 +179,9 @@ weigh_steps <- function(prepared, weight) {
   prepared
 }
 
-#' Fit values until they do not change any more, or backwards
+#' Fit values until they do not change any more, or backwards from a horizon
 #' @param update A function of the fit of the next step (`NULL` at first), the number of a step
-#'   (`NA` without a horizon) and the values ahead of each step (`NULL` at first) that returns
+#'   (`NA` without a horizon) and the values ahead of each step (`NULL` at first). It returns
 #'   another fit.
 #' @param values_of A function of a fit and a step that returns the values ahead.
 #' @param start A fit to start from, or `NULL`. It saves iterations.
@@ -214,14 +217,15 @@ fit_targets <- function(prepared, regression, ahead, step, discount, used = TRUE
   if (!is.null(ahead)) {
     ahead[prepared$ends | !prepared$known] <- 0
     target <- target + discount * ahead
-    # What came after the end of the records is not known.
+    # Steps whose next state was not recorded count nothing.
     weight[!prepared$ends & !prepared$known] <- 0
   }
   if (prepared$stages) weight[prepared$step != step] <- 0
   regression$fit(prepared$rows, target, weight)
 }
 
-# The same for all pairs of a table at once: their mean rewards, and where their steps lead.
+# Does what fit_targets() does, for all pairs of a state and an action at once: it computes their
+# mean rewards and next states in advance.
 table_sweep <- function(prepared, regression, discount) {
   used <- which(prepared$ends | prepared$known)
   own <- unique(prepared$rows[used])
@@ -240,7 +244,7 @@ table_sweep <- function(prepared, regression, discount) {
   }
 }
 
-# A fit is then two, one of each half of the episodes.
+# In double Q-learning a fit consists of two, one for each half of the episodes.
 double_update <- function(prepared, regression, fit, step, discount) {
   half <- prepared$episode %% 2L
   fits <- lapply(0:1, function(own) {
@@ -267,7 +271,7 @@ fit_values <- function(regression, fit, block) {
   regression$values(fit, block)
 }
 
-# The values of actions in each row, by the fit of its step: `NA` for a step without one.
+# The values of actions in each row, by the fit of the row's step. `NA` if that step has no fit.
 values_by_step <- function(regression, fits, block, step) {
   values <- fit_values(regression, fits[[1L]], block)
   for (own in if (length(fits) > 1L) setdiff(step, 1)) {

@@ -1,5 +1,5 @@
-# Fitted Q evaluation: values of a policy by a regression, and its cross-fitted values for doubly
-# robust estimates.
+# Fitted Q evaluation: the values of a policy by a regression. For doubly robust estimates, each
+# episode's values come from a regression on other episodes.
 
 #' Fit the values of the policy
 #'
@@ -30,7 +30,7 @@ policy_fits <- function(design, prepared, next_at, start = NULL) {
 
 most_evaluations <- 200L
 
-# The mean over the actions; what a table has no value for counts 0.
+# The mean over the actions. An action without a value in the table counts 0.
 policy_mean <- function(q, p) {
   q[is.na(q)] <- 0
   rowSums(q * p)
@@ -38,7 +38,7 @@ policy_mean <- function(q, p) {
 
 # Fitted Q evaluation --------------------------------------------------------------------
 
-# The prepared steps of each stratum, whose rule they value.
+# Prepares the steps of each stratum, to evaluate the stratum's own policy.
 prepare_fqe <- function(design) {
   lapply(sort(unique(design$stratum)), function(own) {
     rows <- which(design$stratum[design$steps$episode] == own)
@@ -51,7 +51,7 @@ prepare_fqe <- function(design) {
   })
 }
 
-# The fit to some rows by the rule of a stratum, and what fits it again.
+# Fits the values of a stratum's policy to some rows, and keeps what it needs to fit them again.
 fitting_of <- function(design, own, rows) {
   prepared <- prepare_steps(steps_in(design$steps, rows), design$regression, design$stages)
   if (!is.null(design$regression$states)) prepared <- equal_steps_together(prepared)
@@ -61,7 +61,7 @@ fitting_of <- function(design, own, rows) {
   list(prepared = prepared, next_at = next_at, fit = policy_fits(design, prepared, next_at))
 }
 
-# What is needed in each replicate is computed once.
+# All replicates need the same values of `f`, so keep each value.
 once_per_key <- function(f) {
   kept <- list()
   function(x) {
@@ -77,7 +77,8 @@ fitted_value <- function(design, fitting, count) {
     fits <- if (all(count == 1)) {
       own$fit
     } else {
-      # Keep the rows of episodes that were not drawn with almost no weight: they have levels, too.
+      # Give episodes that were not drawn almost no weight, but keep their rows, because a model
+      # needs to know their factor levels.
       prepared <- weigh_steps(own$prepared, pmax(count, tiny_weight)[own$prepared$episode])
       policy_fits(design, prepared, own$next_at, own$fit[[1L]])
     }

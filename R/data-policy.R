@@ -1,13 +1,13 @@
 # The probability of each action in logged steps: under the policy to evaluate, and in the data.
 
 #' Check the policy to evaluate
-#' @return The policy. A rule that was learned from the same data is an error without folds.
+#' @return The policy. Without folds, a rule that was learned from the same data is an error.
 #' @noRd
 offline_policy <- function(policy, steps, folds, call) {
   policy <- trained_policy(policy)
   if (inherits(policy, "gym_policy_fitted")) {
     shared <- mean(episode_keys(steps) %in% episode_keys(policy$steps))
-    # A few short episodes of other data may be the same by chance.
+    # A few short episodes of different data may be equal by chance.
     abort_if(
       is.null(folds) && shared > 0.2, "policy", policy, call,
       "The policy was learned from the same data ({percent_text(shared)} of the episodes), so its
@@ -23,7 +23,8 @@ offline_policy <- function(policy, steps, folds, call) {
   policy
 }
 
-# The policy of each fold: learned again without its episodes, or the same for all.
+# Returns the policy of each fold: learned again without the fold's episodes, or without folds the
+# same one for all.
 rules_of_folds <- function(policy, steps, fold, folds) {
   if (is.null(folds)) {
     return(list(policy))
@@ -36,12 +37,12 @@ rules_of_folds <- function(policy, steps, fold, folds) {
 #' Compute the probabilities with which policies act
 #'
 #' @return A list: `here`, a matrix with a row for each step and a column for each action, by the
-#'   rule of the step's fold, and `after`, a function of the number of a rule and a step (`NA`
-#'   without a horizon) that returns the same by this rule for all next states.
+#'   rule of the step's fold; and `after`, a function of the number of a rule and a step (`NA`
+#'   without a horizon) that returns such a matrix for all next states, by this rule.
 #' @noRd
 action_probabilities <- function(rules, steps, fold, call) {
   many <- length(rules)
-  # Only a rule with a horizon depends on the step; it stops counting at the horizon.
+  # Only a rule with a horizon depends on the step, and only up to the horizon.
   horizon <- if (inherits(rules[[1L]], "gym_policy_fitted")) length(rules[[1L]]$fits) else 0L
   counts <- horizon > 1L
   ask <- function(own, states, step) {
@@ -95,7 +96,8 @@ probabilities_of <- function(policy, states, step, actions, call) {
   }
 }
 
-# A table and a network have probabilities; another policy says what it does.
+# Asks a policy for its probabilities if it has them, as tables and networks do, and otherwise for
+# its actions.
 known_policy_says <- function(policy, states, call) {
   observed <- if (length(states) == 1L) states[[1L]] else states
   if (inherits(policy$observation_space, "gym_space_discrete")) {
@@ -116,7 +118,7 @@ known_policy_says <- function(policy, states, call) {
 }
 
 checked_probabilities <- function(said, n, labels, call) {
-  # `cbind(1 - p, p)` names one column of two.
+  # `cbind(1 - p, p)` has a name for only one of its two columns.
   named <- function() length(colnames(said)) && all(nzchar(colnames(said)))
   if (!named() && ncol(said) == length(labels)) colnames(said) <- labels
   good <- is.numeric(said) && nrow(said) == n && named() &&
@@ -145,7 +147,7 @@ one_of_actions <- function(said, n, labels, call) {
   one_hot(match(said, labels), length(labels))
 }
 
-# The policy's actions must be in the data: nothing is known of others.
+# The data says nothing about actions that it does not have, so the policy may not take them.
 check_seen_actions <- function(shares, labels, call) {
   never <- setdiff(names(shares)[shares > 0], labels)
   abort_if(
@@ -161,7 +163,8 @@ check_seen_actions <- function(shares, labels, call) {
 #' Find out with which probability the actions of the data were chosen
 #'
 #' @return A list: `of`, a function of the weight of each episode that returns the probability of
-#'   each step's action; `estimated`, whether it depends on the weights; `label`.
+#'   each step's action; `estimated`, whether these probabilities depend on the weights; `label`,
+#'   how they are known, in words.
 #' @noRd
 behavior_of <- function(behavior, steps, call) {
   at <- cbind(seq_along(steps$action), steps$action)
@@ -185,7 +188,7 @@ behavior_of <- function(behavior, steps, call) {
     shares <- function(weight) {
       weight <- weight[steps$episode]
       p <- rowsum(weight, pair)[pair] / rowsum(weight, state)[state]
-      # Episodes that were not drawn count nothing, with any probability.
+      # Episodes that were not drawn count nothing, so their probability may be any.
       ifelse(weight > 0, p, 1)
     }
     return(list(of = shares, estimated = TRUE, label = "shares of actions in each state"))

@@ -1,10 +1,10 @@
 # Regressions of the value of an action in a state: a table of means, a linear model, or any other
 # model that R can fit and predict with.
 #
-# Each is a list of functions. `block(states)` prepares states once, so that values of all actions
-# can be computed many times, and `rows(states, action)` prepares steps: `fit(rows, target, weight)`
-# returns a fit; `values(fit, block)` returns a matrix with a row for each state and a column for
-# each action. `fixed(...)`, if there is one, solves the equations of a policy's values at once.
+# Each is a list of functions. `block(states)` prepares states once, because their values are
+# computed many times. `rows(states, action)` prepares steps. `fit(rows, target, weight)` returns a
+# fit. `values(fit, block)` returns a matrix with a row for each state and a column for each action.
+# `fixed(...)`, which not all of them have, solves the equations of a policy's values at once.
 
 #' Choose the regression
 #'
@@ -26,19 +26,19 @@ regression_of <- function(steps, formula, model, call) {
   if (linear) linear_regression(formula, steps, call) else any_regression(formula, model, steps)
 }
 
-# Few enough states that a table has some steps for each value.
+# Is a table possible? Then its states are few enough that each of its values has some steps.
 is_table_like <- function(steps) {
   countable <- vapply(steps$state, function(x) is.factor(x) || !is.double(x), NA)
   if (!all(countable)) {
     return(FALSE)
   }
   pairs <- !duplicated(data.frame(steps$state, steps$action))
-  # At least five steps for each pair.
+  # On average at least five steps for each pair.
   length(pairs) >= 5L * sum(pairs)
 }
 
-# The response is called `value`. Without a formula a linear model has coefficients of its own for
-# each action, and another model gets all columns.
+# The response is named `value`. Without a user's formula, each action has its own coefficients in a
+# linear model, and any other model gets all columns.
 value_formula <- function(formula, steps, linear, call) {
   if (is.null(formula)) {
     columns <- sprintf("`%s`", names(steps$state))
@@ -64,9 +64,9 @@ value_formula <- function(formula, steps, linear, call) {
   stats::reformulate(deparse1(right), "value", env = environment(formula))
 }
 
-# The states with an action each, as a formula sees them: `action` is a factor, and an action of
-# several parts has a column for each. (Rows of a data frame that are selected twice would get
-# names, which takes long.)
+# The data frame for a formula: states, and an action for each. `action` is a factor, and an action
+# of several parts also has a column for each part. (Selecting rows of a data frame twice makes row
+# names, which takes long. So this selects from each column.)
 with_action <- function(states, action, actions, rows = seq_along(action)) {
   states <- list2DF(lapply(states, function(x) x[rows]))
   if (length(actions) > 1L) {
@@ -81,8 +81,8 @@ with_action <- function(states, action, actions, rows = seq_along(action)) {
 
 # A table -------------------------------------------------------------------------------
 
-# The fit is a matrix with a row for each state, and `NA` where an action was never taken. Rows of
-# steps are their places in it.
+# A fit is a matrix with a row for each state, and `NA` where an action was never taken. The rows of
+# steps are places in this matrix.
 table_regression <- function(steps) {
   states <- sorted_rows(unique(
     rbind(unique(steps$state), unique(steps$after[steps$known, , drop = FALSE]))
@@ -120,10 +120,11 @@ table_regression <- function(steps) {
   )
 }
 
-# Texts that are the same for the same state.
+# A text for each row; equal states have equal texts.
 row_keys <- function(states) row_texts(states, sep = "\r")
 
-# The values of states that lead to each other like this; episodes may end in `ending`.
+# The values of states by the probabilities `moves` from each to each; episodes may end in the
+# states `ending`.
 chain_values <- function(moves, reward, ending, call) {
   leads <- function(reached) times(moves, reached) > 0
   abort_if(
@@ -137,8 +138,8 @@ chain_values <- function(moves, reward, ending, call) {
 
 # A linear model ------------------------------------------------------------------------
 
-# Least squares by normal equations, which are set up once: only the response changes between
-# iterations. The fit is the coefficients.
+# Least squares by normal equations. They are set up once, because only the response changes between
+# iterations. A fit consists of the coefficients.
 linear_regression <- function(formula, steps, call) {
   actions <- steps$actions
   many <- nrow(actions)
@@ -159,7 +160,7 @@ linear_regression <- function(formula, steps, call) {
   kept <- sort(decomposed$pivot[seq_len(decomposed$rank)])
   names <- colnames(x)[kept]
   rows <- function(states, action) design(states, action)[, kept, drop = FALSE]
-  # Columns of the same size lose the fewest digits.
+  # Scale all columns to the same size, which loses the fewest digits.
   size <- sqrt(colSums(x[, kept, drop = FALSE]^2))
   square <- function(rows, others) crossprod(rows, others) / outer(size, size)
   memory <- rlang::env()
@@ -176,14 +177,14 @@ linear_regression <- function(formula, steps, call) {
       })
     },
     fit = function(rows, target, weight) {
-      # They are the same in every iteration.
+      # Rows and weights are the same in every iteration, so factor the equations once.
       of <- list(rows, weight)
       if (!identical(memory$of, of)) {
         memory$of <- of
         memory$qr <- qr(square(rows, weight * rows), tol = 1e-12)
       }
       found <- qr.coef(memory$qr, crossprod(rows, weight * target) / size)[, 1L] / size
-      # As in lm(), terms that depend on others, in these steps, are left out.
+      # As lm() does, leave out terms that depend linearly on others in these steps.
       found[is.na(found)] <- 0
       found
     },

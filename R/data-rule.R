@@ -1,4 +1,4 @@
-# What is learned from data as a policy: it acts, predicts and prints its rule.
+# A rule learned from data is a policy: it acts, predicts and prints itself.
 
 # The values of all actions in some states, a data frame.
 rule_values <- function(policy, states, step = NULL, call = rlang::caller_env()) {
@@ -56,7 +56,8 @@ act.gym_policy_fitted <- function(policy, observation, ...) {
   predict_policy(policy, observation, "action")
 }
 
-# A rule with a horizon counts the steps in its memory. After the last one it goes on as in that.
+# A rule with a horizon counts the steps in its memory. After the horizon it acts as in the last
+# step.
 #' @exportS3Method
 act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
   last <- length(policy$fits)
@@ -79,7 +80,8 @@ act_batch.gym_policy_fitted <- function(policy, observation, n, vector_env) {
   act_batch.gym_policy_memory(policy, observation, n, vector_env)
 }
 
-# A batch of the environment's actions from the actions of the data, or the columns of their parts.
+# Converts actions of the data, or the columns of their parts, to a batch of the environment's
+# actions.
 encoded_actions <- function(vector_env, actions, n) {
   space <- vector_env$action_space
   if (inherits(space, "gym_space_discrete")) {
@@ -124,7 +126,7 @@ print.gym_policy_fitted <- function(x, ...) {
   invisible(x)
 }
 
-# With two actions a linear rule is one inequality; a small table is shown as it is.
+# Shows a linear rule for two actions as an inequality, and a small table as it is.
 rule_lines <- function(x) {
   regression <- x$regression
   labels <- row_texts(x$steps$actions)

@@ -1,22 +1,22 @@
 #' Describe logged steps
 #'
-#' Check a data frame of steps that somebody took, such as visits of patients, and put it into the
-#' form that the functions which learn from data need: a row for each step, in order.
-#' [estimate_model()], [learn_q()], [learn_fitted_q()], [evaluate_offline()] and [learn_bandit()]
-#' take it. They also take the result of [rollout()] with `steps = TRUE`, and its `$steps`.
+#' Check a data frame of steps that somebody took, such as visits of patients, and sort it into a
+#' row for each step, in order. [estimate_model()], [learn_q()], [learn_fitted_q()],
+#' [evaluate_offline()] and [learn_bandit()] learn from the result. They also learn from the result
+#' of [rollout()] with `steps = TRUE`, and from its `$steps`.
 #'
 #' # Episodes
 #'
 #' The next state of a step is the state in the next row of its episode, unless the data has columns
-#' for it. An episode ends where `terminated` is `TRUE`. If its last step is not terminated, it was
-#' cut off: it went on, but nobody recorded how. Without a column `terminated` every episode ends
-#' with its last row.
+#' for it. An episode ends where `terminated` is `TRUE`. If the last step of an episode is not
+#' terminated, the episode was cut off: it went on, but nobody recorded how. Without a column
+#' `terminated` every episode ends with its last row.
 #'
 #' # States and actions
 #'
-#' A state is one column or several of text, factors, logical values or numbers. An action is one
-#' column or several of text, factors, logical values or whole numbers. Several are the parts of an
-#' action, such as a drug and its dose; each combination in the data is an action.
+#' A state has one or several columns of text, factors, logical values or numbers. An action has one
+#' or several columns of text, factors, logical values or whole numbers. Several columns are the
+#' parts of an action, such as a drug and its dose. Each combination in the data is an action.
 #'
 #' @param data A data frame with a row for each step, in any order.
 #' @param episode The name of the column that tells which episode a step belongs to, a string. The
@@ -28,18 +28,20 @@
 #'   steps of a rollout.
 #' @param reward The name of the column of the reward, a string.
 #' @param time The name of the column by which the steps of an episode are sorted, a string. `NULL`,
-#'   the default, uses the column `step`, or if there is none the order of the rows.
+#'   the default, uses the column `step`. Without this column the rows of an episode must be in
+#'   order.
 #' @param terminated The name of the column that is `TRUE` for the last step of an episode that
 #'   ended, a string. `NULL`, the default, uses the column `terminated`, if there is one.
 #' @param probability The name of the column with the probability with which the action was chosen,
 #'   a string. `NULL`, the default, uses the column `probability`, if there is one.
 #' @param next_state The names of the columns of the next state, in the order of `state`. `NULL`,
-#'   the default, uses the columns `next_` and the name of the state's, if all of them are there.
+#'   the default, uses the columns whose names are `next_` and the name of a column of the state, if
+#'   all of them are there.
 #' @return A data frame of class `gym_steps` with the columns `episode`, `step` (its number in the
 #'   episode, an integer), those of the state, `action` (or `action_` and the name of each part),
 #'   `reward`, `terminated`, perhaps `probability`, and `next_` and the name of each column of the
-#'   state. The next state is `NA` where it is not known. Its rows can be selected as those of any
-#'   data frame; the result is accepted, too.
+#'   state. The next state is `NA` where it is not known. You can select rows as from any data
+#'   frame, and learn from the result, too.
 #' @section Errors: `gym_error_argument` for a missing column, missing values (the message names the
 #'   rows), a reward that is not a finite number, a probability of 0 or above 1, two steps of an
 #'   episode at the same time, or an episode that goes on after its end.
@@ -100,7 +102,7 @@ steps_data <- function(data, episode = "episode", state = NULL, action = "action
   structure(steps[columns], class = c("gym_steps", "data.frame"))
 }
 
-# The names of the columns, with those that are taken by default.
+# The names of the columns, including the defaults.
 step_columns <- function(data, episode, state, action, reward, time, terminated, probability,
                          next_state, call) {
   own <- function(name, given) given %||% if (name %in% names(data)) name
@@ -239,7 +241,7 @@ steps_of <- function(data, call = rlang::caller_env()) {
   )
 }
 
-# The rows of some episodes. They keep the numbers of their episodes.
+# Selects some rows. Episodes keep their numbers.
 steps_in <- function(steps, rows) {
   each <- c("episode", "step", "known", "action", "reward", "ends", "probability", "last")
   steps[each] <- lapply(steps[each], function(x) x[rows])
@@ -248,7 +250,7 @@ steps_in <- function(steps, rows) {
   steps
 }
 
-# A text for each episode that is the same for the same steps of an episode of the same name.
+# A text for each episode. Episodes with the same name and the same steps have the same text.
 episode_keys <- function(steps) {
   row <- do.call(paste, c(unname(as.list(steps$state)), list(steps$action, steps$reward)))
   keys <- vapply(split(row, steps$episode), rlang::hash, "")
@@ -257,7 +259,7 @@ episode_keys <- function(steps) {
 
 # Methods -------------------------------------------------------------------------------
 
-# A selection of rows is a plain data frame: it may lack a part of an episode.
+# A selection of rows may lack a part of an episode, so it becomes a plain data frame.
 #' @export
 `[.gym_steps` <- function(x, ...) as.data.frame(x)[...]
 
@@ -307,7 +309,7 @@ estimate_model.gym_steps <- function(x, ...) {
   }
   steps$after[!steps$known, ] <- steps$state[!steps$known, ]
   states <- names(steps$state)
-  # A model of one column without names keeps its numbers.
+  # If the state is a single column of numbers, the model keeps these numbers.
   own <- if (length(states) == 1L) "state" else states
   table <- data.frame(
     episode = steps$episode, step = steps$step, stats::setNames(steps$state, own),

@@ -1,5 +1,5 @@
-# The estimates of `evaluate_offline()` that weight episodes by the ratio of the probabilities of
-# their actions, under the policy and in the data, and their bootstrap.
+# The estimates of `evaluate_offline()` that weight episodes, and their bootstrap. A weight is the
+# probability of an episode's actions under the policy, divided by that in the data.
 
 #' Prepare the estimates by each method
 #'
@@ -26,7 +26,7 @@ estimate_methods <- function(design, method, prepared, counts) {
   found <- if (length(weighted) && !design$chosen$estimated) {
     weighted_estimates(prepared$parts, design$stratum, counts, weighted)
   } else if (length(weighted)) {
-    # The probabilities are estimated again.
+    # Each replicate estimates the probabilities again.
     do.call(rbind, lapply(seq_len(ncol(counts)), function(i) {
       parts <- reweighted(prepared$parts, design, design$chosen$of(counts[, i]))
       weighted_estimates(parts, design$stratum, counts[, i, drop = FALSE], weighted)
@@ -39,7 +39,7 @@ estimate_methods <- function(design, method, prepared, counts) {
   found[, method, drop = FALSE]
 }
 
-# How often each episode is drawn in each replicate, as many as there are in each stratum.
+# How often each episode is drawn in each replicate. Each stratum draws as many as it has.
 drawn_counts <- function(design, replicates) {
   counts <- matrix(0, design$steps$episodes, replicates)
   for (own in split(seq_along(design$stratum), design$stratum)) {
@@ -54,8 +54,9 @@ drawn_counts <- function(design, replicates) {
 #'   state; or `NULL`.
 #' @param chosen The probability of each step's action in the data.
 #' @return A list of matrices with a row for each episode and a column for each step: `weight`, the
-#'   product of ratios of probabilities until then (it stays after the end), `before`, that of the
-#'   step before, and discounted `reward`, `residual` (of the regression) and `value`.
+#'   product of ratios of probabilities up to this step (it stays the same after the end); `before`,
+#'   the weight of the step before; and discounted `reward`, `residual` (of the regression) and
+#'   `value`.
 #' @noRd
 weighted_parts <- function(design, q, chosen) {
   steps <- design$steps
@@ -101,7 +102,7 @@ weighted_estimates <- function(parts, stratum, counts, methods) {
     if (!method %in% c("wis", "wdr")) {
       return(crossprod(counts, episode_scores(parts, method)) / n)
     }
-    # The mean over strata of what is normalised in each.
+    # Normalise within each stratum, then take the mean over strata.
     Reduce(`+`, lapply(seq_len(max(stratum)), function(one) {
       own <- stratum == one
       count <- counts[own, , drop = FALSE]
@@ -109,7 +110,7 @@ weighted_estimates <- function(parts, stratum, counts, methods) {
         weight <- term$weight[own, , drop = FALSE]
         over <- crossprod(count, weight * term$x[own, , drop = FALSE])
         under <- crossprod(count, weight)
-        # Where no episode follows the policy any more nothing is known; only the regression counts.
+        # Where no episode follows the policy any more, only the regression counts.
         rowSums(ifelse(under > 0, over / under, 0))
       }))
     }))
@@ -117,12 +118,12 @@ weighted_estimates <- function(parts, stratum, counts, methods) {
   matrix(unlist(each), ncol = length(methods), dimnames = list(NULL, methods))
 }
 
-# The score of each episode, whose mean is the estimate of a method that does not normalise.
+# The score of each episode. The estimate of a method that does not normalise is the mean score.
 episode_scores <- function(parts, method) {
   rowSums(Reduce(`+`, lapply(terms_of(parts, method), function(term) term$weight * term$x)))
 }
 
-# What a method weights: matrices with a row for each episode, and columns that are added up.
+# The terms that a method weights: matrices with a row for each episode. Their columns are added up.
 terms_of <- function(parts, method) {
   term <- function(weight, x) list(weight = cbind(weight), x = cbind(x))
   switch(

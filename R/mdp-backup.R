@@ -1,10 +1,11 @@
-# A model as matrices with a row for each pair of a state and an action, so that one vectorised step
-# processes all states.
+# Converts a model to matrices with a row for each pair of a state and an action. One vectorised
+# step then processes all states.
 
 #' Prepare a model for sweeps over all its states
 #'
 #' Row s + S * (a - 1) belongs to state s and action a, both counted from 1, of S states. The
-#' columns are the transitions from there; the last ones may be empty.
+#' columns are the transitions of this pair. A row with few transitions has empty columns at its
+#' end.
 #' @param call The user's call.
 #' @return A list: `states` and `actions`, their numbers; `next_state` (from 1) and `weight`,
 #'   matrices, where the weight is the probability that the episode goes on there; and for each row
@@ -41,8 +42,8 @@ backup_of <- function(model, call) {
   ))
 }
 
-# Up to this number of states, moves are kept in a full matrix: loading the package Matrix takes
-# longer than computing with such a matrix.
+# Up to this number of states, a full matrix has the moves. Loading the package Matrix would take
+# longer than computing with the full matrix.
 full_states <- 500L
 
 # With many states, sweeps are faster with the weights in one sparse matrix.
@@ -74,13 +75,13 @@ check_fits_memory <- function(cells, what, call, arg = "model", hint = NULL) {
 state_rows <- function(model, state) as.integer(state - model$observation_space$start + 1L)
 action_columns <- function(model, action) as.integer(action - model$action_space$start + 1L)
 
-# The number of the pair of a state (given by its row) and an action.
+# The number of each pair of a state, given by its row, and an action.
 pair_rows <- function(model, row, action) {
   row + length(model$start) * (action_columns(model, action) - 1L)
 }
 
-# The possible transitions, sorted by their pairs, with the columns `pair`, `from` and `to`: the
-# numbers of pairs and states.
+# The possible transitions, sorted by pair. The columns `pair`, `from` and `to` are numbers of pairs
+# and states.
 numbered_transitions <- function(model) {
   table <- model$transitions[model$transitions$probability > 0, ]
   table$from <- state_rows(model, table$state)
@@ -94,7 +95,7 @@ numbered_transitions <- function(model) {
 action_values <- function(backup, values, discount) {
   if (is.null(backup$flow)) {
     ahead <- values[backup$next_state]
-    # An infinite value that nothing leads to must not count.
+    # Infinity times the probability 0 would be NaN.
     if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
     ahead <- .rowSums(backup$weight * ahead, nrow(backup$weight), ncol(backup$weight))
   } else {
@@ -122,10 +123,10 @@ mean_values <- function(q, probabilities) {
 #' Describe how a policy moves from state to state
 #'
 #' @param probabilities A matrix with a row for each state and a column for each action.
-#' @return A list: `weight`, a matrix of the probability that state j follows state i, sparse if
-#'   there are many states; the rest of a row is the end of the episode; `from` and `to`, the states
-#'   of each move; `reward`, the expected reward in each state; `ends`, the states in which the
-#'   episode may end.
+#' @return A list: `weight`, a matrix with the probability that state j follows state i, sparse if
+#'   there are many states (what a row lacks to 1 is the probability that the episode ends); `from`
+#'   and `to`, the states of each move; `reward`, the expected reward in each state; `ends`, the
+#'   states in which the episode may end.
 #' @noRd
 chain_of <- function(backup, probabilities) {
   moves <- policy_moves(backup, probabilities)

@@ -1,6 +1,6 @@
 # check_env() compares an environment in R with its model, if it has one.
 
-# The largest number of steps in total and in an episode.
+# The largest number of steps in total, and that in an episode.
 most_compared <- 1000L
 most_compared_in_episode <- 100L
 
@@ -54,7 +54,7 @@ steps_by_model <- function(check, model, possible, state, seed) {
   ended <- FALSE
   while (!ended && length(steps) < most_compared_in_episode && !is_wrong(check)) {
     choices <- possible[state_rows(model, state), , drop = FALSE]
-    # A state without actions is an end by the model, so the episode should have ended there.
+    # By the model, an episode ends in a state without actions, so this one should have ended.
     if (!all(rowSums(choices) > 0)) break
     action <- state_numbers(model$action_space)[draw_by_row(choices / rowSums(choices))]
     place <- paste0("step ", length(steps) + 1L, " of the episode with seed ", seed)
@@ -82,8 +82,8 @@ compare_starts <- function(check, model, starts) {
   }
 }
 
-# The first step that the model does not have: by where it led, whether the episode ended there, or
-# the reward.
+# Finds the first step that the model does not have, because of its next state, the end of the
+# episode, or the reward.
 compare_steps <- function(check, model, steps) {
   table <- model$transitions[model$transitions$probability > 0, ]
   parts <- c("state", "action", "next_state", "terminated", "reward")

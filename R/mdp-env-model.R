@@ -1,19 +1,19 @@
 #' Get the model of an environment
 #'
 #' Return the table of transitions of an environment. Gymnasium's FrozenLake, CliffWalking and Taxi
-#' have one, for the arguments they were made with, and so has your own environment made with
-#' `gym_env(model = )`.
+#' have such a model; it depends on the environment's arguments. Your own environment has one if you
+#' made it with `gym_env(model = )`.
 #'
-#' @param env The environment: an id, such as `"FrozenLake-v1"`, or one made by [gym_make()] or
-#'   [gym_env()], which is not changed.
+#' @param env The environment: an id, such as `"FrozenLake-v1"`, or an environment made by
+#'   [gym_make()] or [gym_env()], which is not changed.
 #' @param ... Arguments of the environment, by name, if it is given by its id, such as
 #'   `is_slippery = FALSE`.
 #' @param client The client of the server that makes an environment given by its id. The default is
 #'   the session's client, [gym_client()].
 #' @return An object of class [gym_model].
 #' @section Errors: `gym_error_no_model`, a kind of `gym_error_argument`, for an environment in R
-#'   without a model. `gym_error_http_400` for one of Gymnasium's without a model, for a vector
-#'   environment, or for one with wrappers, which may change the transitions.
+#'   without a model. `gym_error_http_400` for an environment of Gymnasium without a model, for a
+#'   vector environment, or for an environment with wrappers, which may change the transitions.
 #' @seealso [solve_mdp()], [gym_model()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -74,7 +74,7 @@ model_of_env.gym_server_env <- function(env, call) {
   )
 }
 
-# The server's table does not contain what a wrapper in R does.
+# A wrapper in R may change the transitions, and the server's table does not show that.
 #' @exportS3Method
 model_of_env.gym_wrapped_server_env <- function(env, call) abort_without_model(env, call)
 
@@ -101,8 +101,8 @@ model_of_env.gym_r_env <- function(env, call) {
 # The number of resets that estimate the starting states drawn by `reset()`.
 most_resets <- 1000L
 
-# The probability that each state of a model is the first one, by `reset()` of its environment. A
-# copy of the sub-environment is reset.
+# Estimates the probability that an episode starts in each state of a model, by resetting a copy of
+# the sub-environment.
 starts_of <- function(env, model, call) {
   definition <- definition_of(env)
   sub_env <- definition_sub_env(definition, if (definition$vectorized) most_resets)
@@ -138,7 +138,7 @@ abort_without_model <- function(env, call) {
   )
 }
 
-# The model with the environment's spaces, which may have more states and actions than the table.
+# Gives the model the environment's spaces, which may have more states and actions than the table.
 with_spaces_of <- function(env, model, call) {
   if (!inherits(model, "gym_model")) {
     abort_argument(model, "a model or its table of transitions", "gym_env(model = )", call)

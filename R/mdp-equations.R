@@ -1,13 +1,14 @@
-# The linear equations of a policy's values, by sweeps if few are enough, otherwise solved directly.
+# Solves the linear equations of a policy's values: by sweeps if a few are enough, otherwise
+# directly.
 
-# Up to this number of states equations are solved at once; sweeps would take longer.
+# Up to this number of states, solving the equations directly is faster than sweeps.
 unswept_states <- 100L
 
 #' Prepare to solve `values = rewards + weight %*% values`
 #'
 #' @param weight A square matrix, full or sparse, without negative numbers.
-#' @return A function of rewards, none of which may be negative. Each value is then accurate
-#'   relative to its own size, even if it is tiny compared with the others.
+#' @return A function of rewards, which must not be negative. So each value is accurate relative to
+#'   its own size, even if it is tiny compared with the others.
 #' @noRd
 chain_solver <- function(weight, call) {
   solver <- NULL
@@ -40,10 +41,11 @@ chain_solver <- function(weight, call) {
 
 #' Apply a policy's equations until the values do not change any more
 #'
-#' If after k sweeps from 0 no value grows by more than a share e of itself, none grows by more than
-#' a share of about 2 k e in the next k sweeps, and so on. This bounds the error. Alternatively, the
-#' bounds of the remaining growth are close to each other, which is often the case sooner.
-#' @return The values, or `NULL` if so many sweeps would be needed that solving is faster.
+#' The sweeps start from values of 0. They stop when the error is small, by one of two bounds. If
+#' after k sweeps no value grows by more than a share e of itself, none grows by more than a share
+#' of about 2 k e in the next k sweeps, and so on. Often growth_bounds() finds sooner that little
+#' growth remains.
+#' @return The values, or `NULL` if so many sweeps are needed that solving the equations is faster.
 #' @noRd
 swept_values <- function(weight, rewards) {
   enough <- 1e-15
@@ -77,8 +79,8 @@ swept_values <- function(weight, rewards) {
   }
 }
 
-# A function that multiplies a matrix by a vector. The matrix is given by its non-zero numbers, row
-# by row. Only these are used: they are moved to the left.
+# Makes a function that multiplies a sparse matrix by a vector. The matrix is given by its non-zero
+# numbers, row by row. They are moved to the left into a narrow full matrix.
 padded_product <- function(row, column, number, rows) {
   at <- cbind(row, sequence(rle(row)$lengths))
   shape <- c(rows, max(at[, 2L], 1L))

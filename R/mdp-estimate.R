@@ -1,21 +1,23 @@
 #' Estimate a model from steps
 #'
-#' Estimate the probability of each transition by its share among the played steps with the same
-#' state and action (maximum likelihood). Actions that were never tried are not in the model.
+#' Estimate a model from steps that were played. The probability of a transition is its share among
+#' the steps with the same state and action (maximum likelihood). Actions that were never tried are
+#' not in the model.
 #'
 #' @param x The result of [rollout()] with `steps = TRUE, next_observation = TRUE`, or a data frame
 #'   with the columns `state`, `action`, `next_state`, `reward` and `terminated`. The columns
-#'   `episode` and `step` tell which rows are the first of an episode, where episodes start. Without
-#'   `step` the rows of each episode must be in order. Without both, an episode goes on in the next
-#'   row until it is terminated. Observations and actions of several parts that can be counted, such
-#'   as those of a MultiDiscrete space, become states and actions with the names of their columns.
-#'   Or the result of [steps_data()], whose states and actions keep their names. A step that ends an
-#'   episode without a known next state then leads back to its own state.
+#'   `episode` and `step` tell which rows are the first of an episode, and so where episodes start.
+#'   Without `step`, the rows of each episode must be in order. Without both columns, an episode
+#'   goes on in the next row until it is terminated. Observations and actions of several parts that
+#'   can be counted, such as those of a MultiDiscrete space, become states and actions with the
+#'   names of their columns. `x` may also be the result of [steps_data()], whose states and actions
+#'   keep their names. If a step ends an episode and its next state is not known, it leads back to
+#'   its own state.
 #' @param ... For methods.
-#' @return A model, see [gym_model()]. Its states and actions are all of the environment's, if the
-#'   rollout's policy knows them, and otherwise those from the lowest to the highest number in the
-#'   steps. A state that was reached but never left, because episodes were cut off there, counts as
-#'   terminal; a message says so.
+#' @return A model, see [gym_model()]. If the rollout's policy knows the environment's spaces, the
+#'   model has all their states and actions. Otherwise it has those from the lowest to the highest
+#'   number in the steps. A state that was reached but never left, because episodes were cut off
+#'   there, counts as terminal; a message says so.
 #' @section Errors: `gym_error_argument` for a rollout without steps, observations that cannot be
 #'   counted, or rows that are not in order.
 #' @seealso [env_model()], which gets the model from the environment
@@ -38,7 +40,7 @@ estimate_model.default <- function(x, ...) {
 estimate_model.gym_rollout <- function(x, ...) {
   call <- rlang::current_env()
   steps <- x$steps
-  # The spaces of the environment, if the policy has them; a function does not.
+  # The policy knows the environment's spaces, unless it is a function.
   spaces <- if (inherits(x$policy, "gym_policy")) x$policy[c("observation_space", "action_space")]
   if (is.data.frame(steps)) {
     spaces <- counted_spaces(spaces, steps)
@@ -104,7 +106,7 @@ counted_spaces <- function(spaces, steps) {
   spaces
 }
 
-# Named states and actions as their numbers.
+# Converts the names of states and actions to numbers.
 steps_by_number <- function(steps, spaces, call) {
   columns <- names(spaces$observation_space$values)
   after <- paste0("next_", columns, recycle0 = TRUE)
@@ -137,7 +139,7 @@ first_rows <- function(steps, x, call) {
   steps$row[!duplicated(steps$episode)]
 }
 
-# In an episode each step starts where the one before has led.
+# Checks that in an episode each step starts in the next state of the step before.
 check_order <- function(steps, x, call) {
   before <- steps[-nrow(steps), ]
   after <- steps[-1L, ]
@@ -156,7 +158,7 @@ check_order <- function(steps, x, call) {
   }
 }
 
-# Nothing is known of a state that no step has left: arriving there ends the episode.
+# If no step has left a state, nothing is known about it. So an episode ends there.
 end_at_unknown <- function(steps) {
   stuck <- !steps$terminated & !steps$next_state %in% steps$state
   count <- length(unique(steps$next_state[stuck]))

@@ -1,9 +1,9 @@
 #' Make a model from a table of transitions
 #'
-#' A model is the table of transitions of an environment with finitely many states. For each state
-#' and action it has the next states, their probabilities and their rewards. This function makes a
-#' model from your own table. [env_model()] returns that of an existing environment, and
-#' [estimate_model()] estimates one from steps.
+#' Make a model from your own table. A model is the table of transitions of an environment with
+#' finitely many states. For each state and action it has the next states, their probabilities and
+#' their rewards. [env_model()] returns the model of an existing environment, and [estimate_model()]
+#' estimates a model from steps.
 #'
 #' [solve_mdp()] solves a model, and [evaluate_policy()][evaluate_policy.gym_model()] evaluates a
 #' policy by it exactly. A model is also an environment: [rollout()], [train_agent()] and all other
@@ -14,27 +14,27 @@
 #' number.
 #'
 #' States and actions may also have names: text or factors, or several columns, such as `row` and
-#' `column` for the states. In play each is then a number from 0, in the order of the levels, or of
-#' the columns; results, tables and pictures show the names. [policy_table()] and others are asked
-#' by name, too: `predict(solution, "low")`.
+#' `column` for the states. In play, each state and action is then a number from 0, in the order of
+#' the levels, or of the columns. Results, tables and pictures show the names. You can also ask
+#' policies by name: `predict(solution, "low")`.
 #'
 #' @param transitions A data frame with a row for each transition and the columns `state`, `action`
 #'   and `next_state` (whole numbers, text or factors), `reward` (a number), and optionally
 #'   `probability` (default 1) and `terminated` (whether the episode ends there; by default `TRUE`
 #'   if no row leaves `next_state`). An action without a row in a state is invalid there.
-#' @param state The names of the columns of the state, strings. The default is `"state"`. Those of
-#'   the next state have `next_` before them.
-#' @param action The names of the columns of the action, strings. The default is `"action"`. Results
-#'   show those of several parts as `action_` and the name.
+#' @param state The names of the columns of the state, strings. The default is `"state"`. The
+#'   columns of the next state have the same names after `next_`.
+#' @param action The names of the columns of the action, strings. The default is `"action"`. If
+#'   there are several, results show each as `action_` and its name.
 #' @param start Where episodes start: a state's number or name, or several of them, which are
 #'   equally likely; or probabilities, with the states' numbers or names as names, or one for each
-#'   state. (A vector with as many elements as there are states has probabilities.) `NULL`, the
-#'   default, draws uniformly from the states that some row leaves.
-#' @param id Its name in messages and titles, a string.
+#'   state. (A vector with an element for each state has probabilities.) `NULL`, the default, draws
+#'   uniformly from the states that some row leaves.
+#' @param id The model's name in messages and titles, a string.
 #' @param max_episode_steps The number of steps after which an episode is cut off in play, a whole
-#'   number. `NULL`, the default, for no limit.
-#' @param reward_threshold The mean return from which it counts as solved, a number. `NULL`, the
-#'   default, for none.
+#'   number. `NULL`, the default, sets no limit.
+#' @param reward_threshold The mean return from which the model counts as solved, a number. `NULL`,
+#'   the default, sets none.
 #' @return An object of class `gym_model`, a list with the elements
 #'   \describe{
 #'     \item{transitions}{A data frame with the columns `state`, `action`, `next_state` (integer),
@@ -42,17 +42,19 @@
 #'       `as.data.frame()` returns it with the names of states and actions.}
 #'     \item{start}{The probability that each state is the first one, a numeric vector with the
 #'       states' numbers as names.}
-#'     \item{observation_space, action_space}{The states and the actions, Discrete spaces.}
+#'     \item{observation_space, action_space}{The spaces of the states and of the actions, both
+#'     Discrete.}
 #'     \item{spec}{A list of `id`, `reward_threshold` and `max_episode_steps`.}
 #'   }
 #'   [model_arrays()] converts it to the arrays of other packages.
 #' @section Errors: `gym_error_argument` for an invalid table: a missing column, probabilities that
 #'   do not add up to 1 (the message names the state and the action), a state that no row leaves
-#'   although arriving there does not end the episode.
+#'   although an episode goes on there.
 #' @seealso [env_model()], [estimate_model()], [solve_mdp()]
 #' @export
 #' @examples
-#' # A machine that can be run or repaired; worn (1), it breaks (2) in one case of five.
+#' # A machine can be run (0) or repaired (1). A worn machine (state 1) breaks (state 2) one
+#' # time in five.
 #' machine <- gym_model(data.frame(
 #'   state =       c(0,   0,   0,  1,   1,   1),
 #'   action =      c(0,   0,   1,  0,   0,   1),
@@ -132,7 +134,7 @@ check_transitions <- function(x, arg = "transitions", call = rlang::caller_env()
     check_column(x, name, "whole numbers", are_whole_numbers, arg, call)
   }
   check_column(x, "reward", "finite numbers", are_finite, arg, call)
-  # Not `$`: it also matches the start of a name, and a tibble warns.
+  # `$` would also match the start of a name, and would warn for a tibble.
   x[["probability"]] <- probability <- x[["probability"]] %||% rep(1, nrow(x))
   check_column(x, "probability", "numbers from 0 to 1", are_probabilities, arg, call)
   x[["terminated"]] <- terminated <- x[["terminated"]] %||% !x$next_state %in% x$state
@@ -150,8 +152,7 @@ check_is_model <- function(model, call = rlang::caller_env()) {
   }
 }
 
-# The largest difference from 1 of the sum of a state's and action's probabilities, which may be
-# rounded.
+# The probabilities of a state and an action may be rounded, so their sum may differ from 1 by this.
 sum_tolerance <- 1e-6
 
 check_probabilities <- function(table, states, actions, call) {
@@ -214,7 +215,7 @@ start_probabilities <- function(start, table, states, call) {
 
 # Names of states and actions --------------------------------------------------------------
 
-# In a model, states and actions with names are numbers of spaces that know these names.
+# In a model, states and actions are always numbers. If they have names, the spaces know these.
 
 #' Number the states and actions of a table
 #'
@@ -254,7 +255,8 @@ coded_transitions <- function(x, state, action, call, arg = "transitions") {
 
 has_names <- function(x) is.character(x) || is.factor(x) || is.logical(x)
 
-# A factor of the states that were left may lack levels of those that were only reached.
+# Combines the states of both columns. The factor of the first may lack states that were only
+# reached.
 both_rows <- function(from, to) {
   columns <- Map(function(x, y) {
     if (!is.factor(x) && !is.factor(y)) {
@@ -272,7 +274,7 @@ sorted_rows <- function(x) {
   x
 }
 
-# The transitions of a model as people read them.
+# The transitions of a model with the names of states and actions.
 named_transitions <- function(model) {
   table <- model$transitions
   states <- model$observation_space
@@ -310,11 +312,11 @@ as.data.frame.gym_model <- function(x, row.names = NULL, optional = FALSE, ...) 
 #' Convert a model to arrays
 #'
 #' Convert a model to the arrays that other packages use: `P` and `R` are those of MDPtoolbox
-#' (`MDPtoolbox::mdp_value_iteration(P, R, discount)`), and with `start` and their dimnames those of
-#' markovDP.
+#' (`MDPtoolbox::mdp_value_iteration(P, R, discount)`), and together with `start` and the dimnames
+#' they are those of markovDP.
 #'
-#' These packages do not have episodes. The arrays therefore have one more state, the last. Episodes
-#' go there when they end, and nothing leaves it.
+#' These packages do not have episodes. The arrays therefore have one more state, the last one.
+#' Episodes go there when they end, and no action leaves it.
 #'
 #' @param model A model, see [gym_model()].
 #' @return A list: `P`, an array of (S + 1) x (S + 1) x A for S states and A actions, whose element
@@ -350,7 +352,7 @@ model_arrays <- function(model) {
   r <- array(0, c(states + 1L, actions), name)
   expected <- rowsum(table$probability * table$reward, from + (states + 1) * (action - 1))
   r[as.double(rownames(expected))] <- expected
-  # To the end, and there forever.
+  # Invalid actions lead to the end, and the end leads to itself.
   barred <- rbind(!possible_actions(model), TRUE)
   at <- which(barred, arr.ind = TRUE)
   p[cbind(at[, 1L], states + 1L, at[, 2L])] <- 1

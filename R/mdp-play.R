@@ -35,7 +35,7 @@ model_env <- function(model, num_envs = NULL) {
         pair <- pair_rows(model, self$row, action)
         check_possible(moves, model, self$row, action, pair, self$over)
         drawn <- draw_transition(moves, pair)
-        # A sub-environment whose episode has ended is stepped with the others and stays in place.
+        # All sub-environments step together. If the episode of one has ended, it stays where it is.
         self$row <- ifelse(self$over, self$row, moves$next_row[drawn])
         self$over <- self$over | moves$terminated[drawn]
         list(
@@ -63,7 +63,7 @@ as_vector_env.gym_model <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   vector_env
 }
 
-# Is there a way from the start to the end of an episode?
+# Can an episode reach an end from its start?
 can_end <- function(model) {
   moves <- ways_of(model)
   any(moves$terminated & moves$reached[moves$from])
@@ -81,8 +81,8 @@ state_without_end <- function(model) {
   if (length(trap)) state_numbers(model$observation_space)[[trap[[1L]]]]
 }
 
-# The moves of a model that are possible, and the states in which an episode may choose an action:
-# those that are reached from its start.
+# The possible moves of a model, and the states in which an episode may choose an action because it
+# can reach them from its start.
 ways_of <- function(model) {
   moves <- numbered_transitions(model)
   leads <- function(reached) {
@@ -94,9 +94,9 @@ ways_of <- function(model) {
 
 #' Prepare the drawing of a model's transitions
 #'
-#' All probabilities, one transition after the other, form one line on which transition i ends at
-#' `until[i]`. Those of a pair of a state and an action are beside each other, starting at `from`.
-#' One search for a uniform number in that part then finds a transition.
+#' Put the probabilities of all transitions side by side on a line; transition i ends at `until[i]`.
+#' The transitions of a pair of a state and an action are neighbours, and start at `from`. To draw
+#' one, draw a uniform number in this part of the line and find the transition there.
 #' @noRd
 moves_of <- function(model) {
   table <- numbered_transitions(model)
@@ -116,8 +116,8 @@ moves_of <- function(model) {
 draw_transition <- function(moves, pair) {
   at <- moves$from[pair] + stats::runif(length(pair)) * moves$width[pair]
   drawn <- findInterval(at, moves$until) + 1L
-  # By rounding the number may fall beside its own transitions. After the end of an episode any
-  # transition will do.
+  # By rounding, the number may fall just outside the pair's own part. After the end of an episode,
+  # any transition will do.
   drawn <- pmin(pmax(drawn, moves$first[pair]), moves$last[pair])
   drawn[is.na(drawn)] <- 1L
   drawn

@@ -38,7 +38,8 @@ policy_matrix <- function(policy, model, call) {
   probabilities
 }
 
-# Actions, or rows and columns of probabilities, in the order of the model, by their names.
+# Sorts actions, or the rows and columns of probabilities, by their names into the order of the
+# model.
 in_model_order <- function(policy, model, call) {
   states <- names(model$start)
   order_of <- function(given, forms, what, labels) {
@@ -101,7 +102,7 @@ policy_probabilities.default <- function(policy, model, call) {
     observation_space = model$observation_space, action_space = model$action_space,
     spec = model$spec, call = call
   )
-  # Twice, with different streams, to see whether it draws.
+  # Ask twice, with different random numbers, to see whether the policy draws.
   ask <- function(seed) {
     as.vector(with_generator(new_generator(seed), act_batch(policy, asked, length(asked), here)))
   }
@@ -141,14 +142,14 @@ policy_probabilities.gym_policy_table <- function(policy, model, call) {
 #' @param env A model, see [gym_model()] and [env_model()].
 #' @param policy The policy, as for [solve_mdp()], or a list of several.
 #' @param max_steps The number of steps after which episodes are cut off, a whole number. `NULL`,
-#'   the default, uses the model's own limit. Without a limit, or with `Inf`, episodes go on to
-#'   their end.
+#'   the default, uses the model's own limit. Without a limit, or with `Inf`, episodes go on until
+#'   they terminate.
 #' @param ... Must be empty.
 #' @return A data frame with a row for each policy and the columns `candidate` (its number, an
 #'   integer), `mean_return` and `mean_length` (doubles: the expected return, and the expected
 #'   number of steps) and `max_steps` (double, `Inf` for no limit). Names of policies in a list
 #'   become row names.
-#' @section Errors: `gym_error_argument` for a policy that does not fit.
+#' @section Errors: `gym_error_argument` for a policy that does not fit the model.
 #' @seealso [evaluate_policy()], which plays; [solve_mdp()] for the value of each state
 #' @export
 #' @examples
@@ -173,7 +174,7 @@ evaluate_policy.gym_model <- function(env, policy, ..., max_steps = NULL, discou
   if (!length(policies)) {
     abort_argument(policy, "a policy, or a list of at least one", "policy", call)
   }
-  # Each step counts 1 instead of its reward.
+  # To compute lengths, let each step have the reward 1.
   counting <- backup
   counting$expected <- rep(1, length(backup$expected))
   rows <- lapply(seq_along(policies), function(i) {

@@ -1,47 +1,48 @@
 #' Solve a model
 #'
-#' Compute the value of each state of a model exactly: under the best policy, which is found as
-#' well, or under a given one.
+#' Find the best policy of a model and compute the value of each state exactly. With `policy`,
+#' compute the values of this policy instead.
 #'
 #' # Which value
 #'
-#' The value of an environment with a step limit can mean three things. The result prints those that
-#' were computed, for the start:
+#' If an environment has a step limit, its value can mean three things. The result prints the values
+#' of the start that were computed:
 #'
-#' - The value without the limit, as if episodes were never cut off. `solve_mdp(model)` computes it.
+#' - The value without the limit, as if episodes were never truncated. `solve_mdp(model)` computes
+#'   it.
 #' - The value of the same policy with the model's limit, `max_episode_steps`: the expected return
 #'   in play.
 #' - The value of the best policy that also counts the steps and acts differently near the limit.
 #'   `solve_mdp(model, horizon = )` computes it, and no policy achieves more.
 #'
 #' Gymnasium's observations do not include the number of steps, so a learned policy depends only on
-#' the state. The value of the best such policy is between the second and the third; no method here
-#' is certain to find it.
+#' the state. The value of the best such policy is between the second value and the third. No method
+#' here is certain to find this policy.
 #'
 #' # Methods
 #'
 #' Value iteration applies Bellman's equation to all states together until the values do not change
-#' any more, or 20,000 times. Policy iteration then continues from the resulting policy, which is
+#' any more, or 20,000 times. Policy iteration then starts from the resulting policy, which is
 #' usually the best one already. Policy iteration alternates between computing the values of a
-#' policy and improving it. It computes values by sweeps if few are enough, and otherwise by solving
-#' the policy's linear equations, with sparse matrices from 500 states on. Without a discount, a
-#' state that can stay forever without a reward has a value of at least 0, and a state from which no
-#' policy is sure to end has `-Inf`.
+#' policy and improving the policy. It computes values by sweeps if a few are enough. Otherwise it
+#' solves the policy's linear equations, with sparse matrices if there are more than 500 states.
+#' Without a discount two kinds of states are special. A state that can stay where it is forever
+#' without a reward has a value of at least 0. A state from which no policy is sure to end an
+#' episode has the value `-Inf`.
 #'
-#' Two actions are equal if their values differ by less than 1e-12 of their size, which is that of
-#' the rewards in their sums. If several actions are equal, which is common with a discount of 1,
-#' some of them may lead in circles forever. The policy takes those that end episodes in the fewest
-#' steps.
+#' Two actions count as equal if their values differ by less than 1e-12 of the size of the rewards
+#' that were added up. Equal actions are common with a discount of 1, and some of them may lead in
+#' circles forever. The policy takes those that end episodes in the fewest steps.
 #'
 #' @param model A model, see [gym_model()], or an environment that has one, as for [env_model()].
-#' @param policy The policy to evaluate: a [policy_table()], [policy_random()], or another policy
-#'   without random numbers, a vector with the number of an action for each state, or a matrix of
-#'   probabilities with a row for each state and a column for each action. `NULL`, the default,
+#' @param policy The policy to evaluate: a [policy_table()]; [policy_random()]; any other policy
+#'   that draws no random numbers; a vector with the number of an action for each state; or a matrix
+#'   of probabilities with a row for each state and a column for each action. `NULL`, the default,
 #'   finds the best policy.
 #' @param discount The factor by which a reward counts less with each step, a number above 0 and at
 #'   most 1, the default.
 #' @param horizon The number of steps after which everything ends, a whole number. `NULL`, the
-#'   default, for no end.
+#'   default, sets no such number.
 #' @param method `"value_iteration"`, the default, or `"policy_iteration"`. Ignored with a policy or
 #'   a horizon.
 #' @param trace Keep the values after each sweep? `FALSE`, the default, or `TRUE`.
@@ -49,27 +50,27 @@
 #'   [predict()] and [plot()][plot.gym_solution()]. It is a list with the elements
 #'   \describe{
 #'     \item{values}{The value of each state, a numeric vector with the states' numbers or names as
-#'       names; with a horizon, before its first step.}
+#'       names. With a horizon, it is the value before the first step.}
 #'     \item{q}{The value of each action in each state, a matrix with a row for each state and a
 #'       column for each action; `-Inf` for an invalid action.}
-#'     \item{actions}{The numbers of the best actions, an integer vector (`as.data.frame()` has
-#'       their names, if they have some); with a horizon a matrix
-#'       with a column for each step, in order. `NA` for a terminal state, or another one without
-#'       actions. `NULL` for a given policy.}
+#'     \item{actions}{The numbers of the best actions, an integer vector; with a horizon, a matrix
+#'       with a column for each step, in order. If actions have names, `as.data.frame()` shows them.
+#'       `NA` for a terminal state, or any other state without actions. `NULL` if `policy` was
+#'       given.}
 #'     \item{policy}{The best policy, a [policy_table()], or the given one. `NULL` with a horizon,
-#'       because such a policy counts steps.}
+#'       because then the best policy counts steps.}
 #'     \item{start_value}{The value of the start, a number: the mean value over the starting
 #'       states.}
 #'     \item{limited}{The value of the start if the policy's episodes are cut off after the model's
 #'       `max_episode_steps`, a number. `NULL` without such a limit or with a horizon.}
-#'     \item{trace}{The values after each sweep, a matrix with a row for each, starting with the
-#'       values 0; `NULL` without `trace = TRUE`.}
-#'     \item{model, discount, horizon, method, sweeps}{As given, and the number of sweeps.}
+#'     \item{trace}{The values after each sweep, a matrix with a row for each sweep. The first row
+#'       has the initial values, 0. `NULL` without `trace = TRUE`.}
+#'     \item{model, discount, horizon, method, sweeps}{The arguments, and the number of sweeps.}
 #'   }
-#' @section Errors: `gym_error_argument` for an invalid argument, or a model with infinite values:
-#'   without an end, or with rewards that go on forever, if there is neither a discount below 1 nor
-#'   a horizon; or for one that is too large for the memory, in states times actions times
-#'   transitions of each.
+#' @section Errors: `gym_error_argument` for an invalid argument, for a model whose values are
+#'   infinite, and for a model that is too large for the memory. Values can be infinite if there is
+#'   neither a discount below 1 nor a horizon, and episodes or rewards go on forever. The size of a
+#'   model is the number of states times actions times transitions of each.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press, chapter 4.
 #' @seealso [evaluate_policy()][evaluate_policy.gym_model()], which evaluates several policies by a
@@ -123,7 +124,7 @@ check_discount <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   }
 }
 
-#' Compute the values, of a policy or the best ones, with a number of steps to go
+#' Compute the values of a policy, or the best values, for a number of steps
 #' @param see A function that is called with the values after each sweep.
 #' @noRd
 solve_horizon <- function(backup, horizon, discount, probabilities, see, call) {
@@ -133,7 +134,7 @@ solve_horizon <- function(backup, horizon, discount, probabilities, see, call) {
   }
   values <- sizes <- numeric(backup$states)
   choices <- vector("list", horizon)
-  # The last sweep is that of the first step.
+  # Go backwards from the last step, so the last sweep gives the values of the first step.
   for (step in rev(seq_len(horizon))) {
     q <- action_values(backup, values, discount)
     values <- if (best) best_values(q) else mean_values(q, probabilities)
@@ -153,11 +154,11 @@ new_solution <- function(model, backup, found, policy, probabilities, discount, 
   actions <- NULL
   if (is.null(policy)) {
     actions <- found$choice + first_action - 1L
-    # In a terminal state there is nothing to do; the states of a matrix are its rows.
+    # A terminal state has no action.
     actions[rowSums(possible_of(backup)) == 0] <- NA
     if (is.null(horizon)) {
       probabilities <- choice_probabilities(backup, found$choice)
-      # Any action will do in a state without actions.
+      # In a state without actions, any number will do.
       taken <- probabilities
       taken[rowSums(taken) == 0, 1L] <- 1
       policy <- policy_bind(policy_table(taken), model)

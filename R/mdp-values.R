@@ -1,12 +1,13 @@
 # Values of a given policy, and optimal values, without a limit of steps.
 
-# Value iteration ends if no state's value changes by more than this, relative to its size, taking
-# the discount into account. If that takes longer, policy iteration continues.
+# Value iteration ends when no state's value changes by more than this, relative to its size and
+# taking the discount into account. After too many sweeps, policy iteration continues instead.
 sweep_tolerance <- 1e-13
 most_sweeps <- 20000L
 
-# Actions whose values differ by less than this, relative to their size, are equal. But even a
-# smaller gain is worth taking if it occurs often, down to rounding errors.
+# Actions are equal if their values differ by less than this, relative to their size. Policy
+# iteration also takes smaller gains, down to rounding errors, because a gain that occurs often adds
+# up.
 tie_tolerance <- 1e-12
 least_gain <- 1e-14
 
@@ -15,10 +16,10 @@ least_gain <- 1e-14
 #' Compute the values of a policy
 #'
 #' Solves the policy's linear equations. With a discount of 1, only states from which episodes end
-#' have equations. A state from which the policy never ends has 0 if it gets no more rewards, an
+#' have equations. A state from which episodes never end has the value 0 if no more rewards come, an
 #' infinite value if rewards of one sign go on forever, and otherwise `NaN`.
-#' @return A list: `values`, and `sizes`, the values if no reward were negative. Differences are
-#'   compared with these to detect rounding errors.
+#' @return A list: `values`; and `sizes`, the values if each reward were replaced by its absolute
+#'   value. A difference that is tiny compared with `sizes` is a rounding error.
 #' @noRd
 policy_values <- function(backup, probabilities, discount, call) {
   chain <- chain_of(backup, probabilities)
@@ -27,10 +28,10 @@ policy_values <- function(backup, probabilities, discount, call) {
   equations <- rep(TRUE, backup$states)
   if (discount == 1) {
     leads <- function(reached) times(weight, reached) > 0
-    # After these neither a reward nor an end comes.
+    # From these states no reward and no end can be reached.
     resting <- !closure(leads, chain$reward != 0 | chain$ends)
     good <- closure(leads, chain$ends | resting)
-    # A state that can reach the end may also reach one from which it never comes.
+    # A state that can reach the end may also reach a state from which episodes never end.
     endless <- if (all(good)) !good else closure(leads, !good)
     equations <- good & !resting & !endless
     values[endless] <- endless_values(chain, leads, !good)[endless]
@@ -48,7 +49,7 @@ policy_values <- function(backup, probabilities, discount, call) {
   list(values = values, sizes = sizes)
 }
 
-# The rewards that come forever are those of the states that the policy always returns to.
+# Rewards that go on forever are those of states that the policy always returns to.
 endless_values <- function(chain, leads, never_ends) {
   returns <- returning_states(chain, never_ends)
   gains <- closure(leads, returns & chain$reward > 0)
@@ -58,16 +59,16 @@ endless_values <- function(chain, leads, never_ends) {
 
 #' Find the states that a policy always returns to
 #'
-#' They form classes that nothing leaves and in which every state reaches all others. The lowest
-#' number that a state reaches is the same for the whole class, so the state with this number
-#' reaches itself and only states from which it is reached again.
+#' Such states form classes that nothing leaves and in which every state reaches all others. So all
+#' states of a class have the same lowest number among the states that they reach. The state with
+#' this number represents the class: it reaches only states that lead back to it.
 #' @param among A logical vector of states, which reach only such states.
 #' @noRd
 returning_states <- function(chain, among) {
   inside <- among[chain$from]
   from <- chain$from[inside]
   to <- chain$to[inside]
-  # If several values are assigned to a state, the last one stays, which is the lowest.
+  # If several values are assigned to a state, R keeps the last one, which here is the lowest.
   lowest <- function(labels) {
     repeat {
       sorted <- order(labels[to], decreasing = TRUE, method = "radix")
@@ -88,14 +89,14 @@ returning_states <- function(chain, among) {
   )
 }
 
-# The best, without a limit --------------------------------------------------------------
+# The best values, without a limit --------------------------------------------------------------
 
 #' Find the best values
 #'
-#' Without a discount two kinds of states are special. Some can rest: stay forever without a reward,
-#' which has the value 0. They get one more action, the last one, which ends the episode with 0.
-#' From others no policy is sure to end or to rest. These have the value `-Inf`, and no action that
-#' may lead there is taken.
+#' Without a discount two kinds of states are special. Some can rest, which means that they can go
+#' on forever without a reward. This has the value 0, so these states get one more action, the last
+#' one, which ends the episode with the reward 0. From others no policy is sure to end or to rest.
+#' These have the value `-Inf`, and the best policy takes no action that may lead there.
 #' @return A list: `values`, `choice` (the number of an action for each state, from 1) and `sweeps`.
 #' @noRd
 best_endless_values <- function(backup, discount, method, see, call) {
@@ -126,14 +127,15 @@ iterate_values <- function(backup, discount, see) {
     see(new)
     change <- abs(new - values)
     values <- new
-    # A value that came down to 0 is only as accurate as the values it came from.
+    # A value that has shrunk to 0 is only as accurate as the larger values before it.
     sizes <- pmax(sizes, abs(values))
     if (all(change <= enough * sizes)) break
   }
   list(tied = tied_actions(action_values(backup, values, discount), sizes), sweeps = sweep)
 }
 
-# The start of policy iteration: a policy that ends if it must, of the tied actions if these do.
+# The first policy of policy iteration. Without a discount it must end episodes; it takes tied
+# actions where these do.
 starting_choice <- function(backup, tied, discount) {
   possible <- possible_of(backup)
   ending <- surely_ending(backup, tied %||% possible)
@@ -168,7 +170,7 @@ iterate_policies <- function(backup, choice, discount, call, see = function(valu
     better <- !tied_actions(q, found$sizes, least)[own] & q[own] > -Inf
     seen[[sweep]] <- choice
     choice[better] <- best_column(q)[better]
-    # A policy that comes again was better by rounding only.
+    # If a policy comes up again, it was better only by rounding.
     if (any(vapply(seen, identical, NA, choice))) {
       tied <- tied_actions(q, found$sizes)
       tied[own] <- q[own] > -Inf
@@ -184,7 +186,7 @@ tied_actions <- function(q, sizes, tolerance = tie_tolerance) {
   q >= row_max(q) - tolerance * pmax(abs(q), sizes) & q > -Inf
 }
 
-# The first valid action of each state, a logical matrix.
+# The first valid action of each state. `actions` is a logical matrix.
 first_of <- function(actions) best_column(actions + 0)
 
 possible_of <- function(backup) array(backup$possible, c(backup$states, backup$actions))
@@ -223,7 +225,7 @@ with_rest <- function(backup) {
   list(backup = rested, stays = rest$actions, hopeless = !ending$states & leaves)
 }
 
-# The states that can stay forever without a reward, and the actions for it.
+# The states that can rest (go on forever without a reward), and the actions that do it.
 resting_actions <- function(backup) {
   shape <- c(backup$states, backup$actions)
   calm <- array(backup$possible & backup$expected == 0 & backup$ends == 0, shape)
@@ -234,16 +236,16 @@ resting_actions <- function(backup) {
   list(states = !leaves, actions = calm_beside(leaves) & !leaves)
 }
 
-# To rest is to take an action that stays without a reward.
+# Replaces the additional action, rest, by a real action that rests.
 without_rest <- function(choice, backup, task) {
   rests <- choice > backup$actions
   choice[rests] <- first_of(task$stays)[rests]
-  # If nothing ends, all actions are equal.
+  # From hopeless states all actions have the value -Inf, so take the first valid one.
   choice[task$hopeless] <- first_of(possible_of(backup))[task$hopeless]
   choice
 }
 
-# Positive rewards that go on forever have an infinite value.
+# Without an end, positive rewards may add up to an infinite value.
 check_hopeless <- function(backup, hopeless, call) {
   gains <- array(backup$expected > 0, c(backup$states, backup$actions)) & possible_of(backup)
   endless <- hopeless & rowSums(gains) > 0
@@ -254,7 +256,7 @@ check_hopeless <- function(backup, hopeless, call) {
 
 # Choosing among equals ---------------------------------------------------------------
 
-# The tied actions that end episodes soonest, unless the losses of single steps add up.
+# Chooses the tied actions that end episodes soonest, unless small losses of many steps add up.
 soonest_choice <- function(backup, found, discount, call) {
   choice <- ending_choice(backup, found$tied, call)
   if (identical(choice, found$choice)) {
@@ -266,9 +268,9 @@ soonest_choice <- function(backup, found, discount, call) {
 
 #' Choose an action in each state so that episodes end, and soon
 #'
-#' Some of several actions with the same value may lead in a circle forever. Of the allowed actions
-#' this takes those that reach the end in the fewest steps on average, found by policy iteration
-#' with a cost of 1 for each step.
+#' If several actions have the same value, some may lead in a circle forever. This function takes
+#' those allowed actions that reach the end in the fewest steps on average. It finds them by policy
+#' iteration with a cost of 1 for each step.
 #' @param allowed A logical matrix with a row for each state and a column for each action.
 #' @return The number of an action for each state, from 1.
 #' @noRd
@@ -281,8 +283,8 @@ ending_choice <- function(backup, allowed, call) {
   steps$expected <- rep(-1, length(backup$expected))
   steps$possible <- as.vector(ending$allowed)
   found <- iterate_policies(steps, ending$choice, 1, call)
-  # Rounding differences must not decide, unless there are so many steps that one more is only
-  # rounding, too.
+  # Rounding errors must not decide. But if there are very many steps, even one step more is as
+  # small as a rounding error.
   soonest <- first_of(found$tied)
   chosen <- choice_probabilities(steps, soonest) > 0
   ends <- identical(surely_ending(backup, chosen)$states, ending$states)
@@ -292,8 +294,8 @@ ending_choice <- function(backup, allowed, call) {
 #' Find the states from which allowed actions can make every episode end
 #'
 #' @return A list: `states`, a logical vector; `allowed`, the actions that lead to no other states,
-#'   a logical matrix; and `choice`, an action for each state by which every episode ends, because
-#'   it may lead nearer to the end. If nothing ends, it is the first allowed one.
+#'   a logical matrix; and `choice`, an action for each state. It may lead nearer to the end, so
+#'   every episode ends. If no episode ends from a state, it is the first allowed action.
 #' @noRd
 surely_ending <- function(backup, allowed) {
   shape <- c(backup$states, backup$actions)

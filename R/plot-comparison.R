@@ -1,7 +1,7 @@
-# Several policies in one picture: a row for each with the distribution of its returns, and a column
-# for each environment.
+# Draws several policies in one picture. Each policy has a row with the distribution of its returns,
+# and each environment has a column.
 
-# More rows than this could not be told apart.
+# With more rows a reader could not tell them apart.
 most_rows <- 10L
 
 comparison_picture <- function(rollouts) {
@@ -9,7 +9,7 @@ comparison_picture <- function(rollouts) {
   returns <- data$returns
   one_env <- nlevels(returns$env_id) == 1L
   ggplot2::ggplot(returns, ggplot2::aes(.data$value, fill = .data$label, colour = .data$label)) +
-    # All rows have the same height.
+    # Scale each density, so that all rows have the same height.
     ggplot2::geom_density(
       ggplot2::aes(y = ggplot2::after_stat(.data$scaled)), returns[returns$kind == "density", ],
       trim = TRUE, alpha = 0.4
@@ -65,7 +65,7 @@ bars_of_rows <- function(returns) {
   list(
     ggplot2::geom_bar(
       height, few, width = bar_width(few$value, returns$value),
-      # Bars may be wider than the distance between two values, so that they are seen.
+      # Bars that must be wide enough to see may be wider than the distance between two values.
       position = "identity", alpha = 0.4
     ),
     if (nrow(whole)) {
@@ -92,7 +92,7 @@ comparison_plot_data <- function(rollouts) {
     if (length(groups) <= most_rows) groups else groups[highest]
   })
   shown <- unlist(unname(by_env), recursive = FALSE)
-  # In the order of the rows, which is that of the colours.
+  # Colours go by the order of the rows.
   label <- factor(names(shown), unique(names(shown)))
   env_id <- factor(rep(names(by_env), lengths(by_env)), names(by_env))
   list(
@@ -140,8 +140,8 @@ candidate_returns <- function(x, label, several) {
 
 #' Plot evaluations of policies
 #'
-#' Show the mean return of each policy as a dot with its confidence interval. Of more than ten
-#' policies, the ten with the highest mean returns are shown.
+#' Show the mean return of each policy as a dot with its confidence interval. If there are more than
+#' ten policies, the picture shows the ten with the highest mean returns.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -190,11 +190,12 @@ autoplot.gym_evaluation <- function(object, ...) {
 
 #' Plot a comparison of trainings
 #'
-#' Show a comparison. For scores: the mean, median and interquartile mean of each training with
-#' their intervals (`type = "scores"`, the default), the performance profiles (`"profile"`), or the
-#' probabilities that one training scores higher than another (`"improvement"`). For steps to a
-#' target: the share of runs that have reached it, over the steps of the training, with its
-#' interval. Ticks are the ends of runs that failed or were interrupted.
+#' Show a comparison of trainings. If they were compared by scores, `type` chooses the picture: the
+#' mean, median and interquartile mean of each training with their intervals (`"scores"`, the
+#' default), the performance profiles (`"profile"`), or the probabilities that one training scores
+#' higher than another (`"improvement"`). If they were compared by steps to a target, the picture
+#' shows the share of runs that have reached the target, over the steps of the training, with its
+#' interval. Ticks mark the ends of runs that failed or were interrupted.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -241,7 +242,7 @@ autoplot.gym_comparison <- function(object, type = c("scores", "profile", "impro
 
 score_label <- function(x) if (is.null(x$reference)) "mean return" else "normalised score"
 
-# Rows whose names fit a third of four inches.
+# Breaks the names of rows so that they fit a third of four inches.
 named_rows <- function() ggplot2::scale_y_discrete(labels = function(at) broken_texts(at, 18))
 
 scores_picture <- function(x) {
@@ -262,7 +263,7 @@ scores_picture <- function(x) {
     picture_labels(x = score_label(x), y = NULL)
 }
 
-# Lines with bands over scores or steps.
+# Draws lines with bands over scores or steps.
 shares_picture <- function(rows, x, geom) {
   labels <- unique(rows$training)
   rows$training <- factor(rows$training, labels)
@@ -283,7 +284,7 @@ improvement_picture <- function(x) {
   rows <- x$improvement
   if (is.null(rows)) {
     abort_wrong("type", "improvement", NULL,
-                "There is one training: none could score higher than another.")
+                "There is only one training, so there is nothing to compare.")
   }
   rows$pair <- paste0(rows$training, " > ", rows$than)
   ggplot2::ggplot(rows, ggplot2::aes(
@@ -297,7 +298,7 @@ improvement_picture <- function(x) {
 }
 
 reached_picture <- function(x) {
-  # Add the corners of the steps, because the band needs them, too.
+  # geom_ribbon() draws no steps, so add the corners of the steps.
   rows <- do.call(rbind, lapply(split(x$profile, list(x$profile$training, x$profile$env_id),
                                       drop = TRUE), function(rows) {
     n <- nrow(rows)
@@ -324,8 +325,8 @@ reached_picture <- function(x) {
 
 #' Plot estimates from data
 #'
-#' Show the estimate of each method with its interval, beside the mean return of the data (the
-#' dashed line, with its interval as a band).
+#' Show the estimate of each method with its interval. The dashed line is the mean return in the
+#' data, and the band is its interval.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.

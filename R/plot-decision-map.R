@@ -1,8 +1,8 @@
 #' Map what a policy does
 #'
-#' Ask a policy for its actions on a grid over two parts of the observation, with the other parts
-#' held constant. [plot()][plot.gym_decision_map()] shows the map. Nothing is played, unless
-#' `path = TRUE`.
+#' Ask a policy for its actions on a grid of values of two parts of the observation. The other parts
+#' stay constant. [plot()][plot.gym_decision_map()] shows the map. Nothing is played, unless `path =
+#' TRUE`.
 #'
 #' # What is shown
 #'
@@ -11,13 +11,13 @@
 #' - A network with the output `"softmax"` and two actions: the probability of the second one.
 #' - Any other policy with discrete actions: the action. A function is called as in [act()]. A
 #'   network that draws its actions shows the most likely one.
-#' - Actions that are a Box: the action, or, of several numbers, the one selected by `action`.
+#' - Actions of a Box: the action, or, if it has several numbers, the one that `action` selects.
 #'
 #' For Discrete observations the map has the action in each state, and the other arguments are
 #' ignored. [plot()][plot.gym_state_map()] shows it on the grid of FrozenLake, CliffWalking or Taxi.
-#' The action is `NA` where there is none: in states in which, by the environment's model (see
-#' [env_model()]), no episode chooses an action, and where all values of a table are equal, as in
-#' states that were never visited.
+#' The action is `NA` in two kinds of states: those in which, by the environment's model (see
+#' [env_model()]), no episode chooses an action; and those in which all values of a table are equal,
+#' because they were never visited.
 #'
 #' If observations have several parts with few values each, like Blackjack's, the map has the action
 #' in each state, and its value if the policy is a table. `x` and `y` are the first two parts by
@@ -27,14 +27,14 @@
 #' # Ranges
 #'
 #' `xlim` and `ylim` set the ranges. By default, CartPole's positions have the range in which an
-#' episode goes on, and its velocities the range of balanced and falling poles. Other parts have
-#' the range of the path. Without a path they have their bounds in the observation space; parts
-#' without bounds need one.
+#' episode goes on, and its velocities have the range of balanced and falling poles. In other
+#' environments, each part has the range of the path. Without a path, it has its bounds in the
+#' observation space. If a part has no bounds, give a range or a path.
 #'
 #' @param env The environment, which supplies the names of observations and the meanings of actions:
 #'   an id, such as `"CartPole-v1"`, the result of [gym_wrap()], or an environment made by
-#'   [gym_make()], which is not changed. `NULL`, the default, for a network that was played before,
-#'   or whose inputs may be named `obs_1`, `obs_2`, ...
+#'   [gym_make()], which is not changed. It may be `NULL`, the default, for a network that was
+#'   played before. For any other network, `NULL` names the inputs `obs_1`, `obs_2`, ...
 #' @param policy The policy: a network, made by [policy_network()] or found by a search, or a
 #'   function of many observations as for [rollout()].
 #' @param x,y The two parts of the observation to map: their names, such as `"pole_angle"`, or
@@ -42,11 +42,12 @@
 #' @param at The values of the other parts: a numeric vector with their names, such as
 #'   `c(cart_position = 1)`. By default a part is 0, or the middle of its bounds if these exclude 0.
 #' @param path Episodes to show on the map: the result of [rollout()] with `steps = TRUE`, or a data
-#'   frame of steps like its own; `TRUE` to play one episode of the policy in `env`; `NULL`, the
-#'   default, for none. Along the path the other parts change, too; the map holds them constant.
+#'   frame of steps like its own; `TRUE` to play one episode of the policy in `env`; or `NULL`, the
+#'   default, for no path. Note that along the path the other parts change, too, while the map holds
+#'   them constant.
 #' @param xlim,ylim The ranges, numeric vectors of length 2, or `NULL`, the default.
-#' @param action The number to map of an action that is a Box of several, a whole number from 1, the
-#'   default.
+#' @param action Which number of an action to map, if an action is a Box of several numbers. A whole
+#'   number from 1, the default.
 #' @param size The number of points in each direction, a whole number of at least 2. The default
 #'   is 101.
 #' @param seed A whole number that fixes the episode played with `path = TRUE` and leaves the
@@ -61,7 +62,8 @@
 #'   `as.data.frame()` returns it.}
 #'   \item{x, y}{The names of the two parts, strings.}
 #'   \item{kind}{What is mapped, a string: `"output"`, `"choice"`, `"value"`, `"state"` or
-#'   `"parts"`. A map of parts also has `panels`, the names of the parts on no axis.}
+#'   `"parts"`. A map of kind `"parts"` also has `panels`, the names of the parts that are on no
+#'   axis.}
 #'   \item{at}{The values of the other parts, a named numeric vector.}
 #'   \item{path}{The path, a data frame of `episode`, `x` and `y`, or `NULL`.}
 #'   \item{actions}{The names of the actions, strings; for a Box the name of the number.}
@@ -161,7 +163,7 @@ mapped_place <- function(env, policy, client, call = rlang::caller_env()) {
     ))
   }
   played <- inherits(policy, "gym_policy_model") && !is.null(policy$observation_space)
-  # The sizes of a network that was not played may be open.
+  # A network that was not played may not know its sizes yet.
   sized <- inherits(policy, "gym_policy_network") && !anyNA(policy$sizes)
   if (!sized && !played) {
     abort_wrong("env", env, call,
@@ -201,7 +203,7 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
   n <- space$n %||% max(2L, ncol(outputs))
   actions <- action_names(place$env_id, n, space$start %||% 0L)
   two <- !is.null(outputs) && n == 2L
-  # The output, if a single bounded output chooses between two actions.
+  # Show the output itself if a single bounded output chooses between two actions.
   shown <- if (two && identical(place$policy$output, "softmax")) {
     softmax_rows(outputs)[, 2L]
   } else if (two && ncol(outputs) == 1L && has_range(place$policy)) {
@@ -213,7 +215,7 @@ decide <- function(place, values, action, call = rlang::caller_env()) {
   )
 }
 
-# A function is called as in a rollout.
+# Calls a function in the same way as a rollout does.
 policy_actions <- function(place, values, outputs) {
   if (!is.null(outputs)) {
     return(network_action(place$action_space, outputs, greedy_policy(place$policy), one = FALSE))

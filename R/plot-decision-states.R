@@ -1,7 +1,7 @@
-# The decision map of a policy that observes the number of a state, or several such numbers: its
-# action in each of them.
+# Makes the decision map of a policy whose observations can be counted: one number of a state, or
+# several numbers. The map has the action in each state.
 
-# One number, or several with few values each, like Blackjack's.
+# Are observations a single number, or several numbers with few values each, like Blackjack's?
 is_counted <- function(space) {
   inherits(space, "gym_space_discrete") ||
     !is.null(space) && !is.null(space_index(space)) && length(digit_values(space)) > 1L
@@ -45,8 +45,9 @@ counted_map <- function(place, env, client, x, y, xlim, ylim, at, call) {
   )))
 }
 
-# Whether a policy has an action in each row of its table: one is valid, and not all valid ones have
-# the same value, as in states that were never visited. Other policies always have one.
+# Does a table have an action in each row? It needs a valid action, and the values of valid actions
+# must not all be equal, as they are in states that were never visited. Other policies always have
+# an action.
 has_action <- function(policy) {
   if (!inherits(policy, "gym_policy_table")) {
     return(TRUE)
@@ -65,8 +66,8 @@ states_in_play <- function(env, client) {
   if (is.null(model)) TRUE else ways_of(model)$reached
 }
 
-# The map of observations that have several parts, without actions. `in_play` tells which rows to
-# show; `panels` are the names of the parts on no axis.
+# Makes the map of observations that have several parts, without the actions. `in_play` says which
+# rows to show; `panels` are the names of the parts that are on no axis.
 mapped_parts <- function(space, x, y, xlim, ylim, at, call) {
   grid <- all_values(space)
   observed <- list(names = names(grid))

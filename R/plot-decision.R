@@ -1,9 +1,9 @@
 #' Plot a decision map
 #'
-#' Show the actions of a policy over two parts of the observation. The colour is the output of a
-#' network that is rounded to one of two actions, with a line at one half; or the action; or the
-#' value of an action that is a Box, with a line at the middle of its bounds. The path of an episode
-#' starts at the ring and ends at the cross.
+#' Show the actions of a policy over two parts of the observation. The colour is one of three
+#' things: the output of a network that is rounded to one of two actions, with a line at one half;
+#' the action itself; or a number of an action that is a Box, with a line at the middle of its
+#' bounds. The path of an episode starts at the ring and ends at the cross.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -68,14 +68,14 @@ decision_plot_data <- function(x) {
     return(list(points = points, fill = action_fill(numbers, x$actions, taken = found)))
   }
   if (x$kind == "output") {
-    # The colours span the range of the outputs around one half, because small weights make small
-    # differences.
+    # With small weights, outputs differ little. So the colours span only the range of the outputs
+    # around one half.
     border <- 0.5
     limits <- border + c(-1, 1) * max(abs(points$shown - border), 0.01)
     name <- paste0("output, above 0.5:\n", x$actions[[2L]])
   } else {
     limits <- x$limits %||% range(points$shown)
-    # One colour if there is only one value.
+    # A colour scale needs a range, also if there is only one value.
     if (diff(limits) == 0) limits <- limits + c(-1, 1)
     name <- x$actions
     border <- mean(limits)
@@ -83,7 +83,8 @@ decision_plot_data <- function(x) {
   inside <- range(points$shown)
   list(
     points = points, fill = continuous_fill(name, diverging_colours, limits = limits),
-    # The line between two actions, if both occur: ggplot2 warns about an empty line.
+    # Draw the line between two actions only if both occur, because ggplot2 warns about an empty
+    # line.
     border = if (border > inside[[1L]] && border < inside[[2L]]) {
       ggplot2::geom_contour(
         ggplot2::aes(z = .data$shown), breaks = border, colour = "black", linewidth = 0.8
@@ -96,18 +97,18 @@ decision_plot_data <- function(x) {
 
 #' Plot what a policy does in each state
 #'
-#' Show the action of a policy in each state as a colour and an arrow or a letter. Supported grids
-#' are FrozenLake, CliffWalking, Taxi (for one passenger and destination) and any other grid whose
-#' `columns` you give. Otherwise each state has a point. States without an action, such as terminal
-#' ones and those that were never visited, are empty (see [decision_map()]). If there are more than
-#' six actions, the colours are a scale of their numbers.
+#' Show the action of a policy in each state as a colour and an arrow or a letter. FrozenLake,
+#' CliffWalking and Taxi (for one passenger and destination) are drawn as grids, and so is any other
+#' environment if you give `columns`. Otherwise each state has a point. States without an action,
+#' such as terminal ones and those that were never visited, are empty (see [decision_map()]). If
+#' there are more than six actions, the colours are a scale of their numbers.
 #'
 #' If observations have several parts with few values each, two of them are on the axes, and there
-#' is a panel for each value of the others. Where a state has room, it carries the number of its
-#' action. For Blackjack this is figure 5.2 of Sutton and Barto (2018).
+#' is a panel for each value of the others. If there is room in a state's cell, it has the number of
+#' the action. For Blackjack this is figure 5.2 of Sutton and Barto (2018).
 #'
-#' With `type = "q"` it shows the values of all actions instead, if the policy is a table of values:
-#' a triangle for each direction, as in [plot.gym_solution()].
+#' If the policy is a table of values, `type = "q"` shows the values of all actions instead: a
+#' triangle for each direction, as in [plot.gym_solution()].
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -171,7 +172,7 @@ autoplot.gym_state_map <- function(object, ..., type = c("actions", "q"), column
   picture + map_labels(object, c(shown, taxi_subtitle(data)), axes = by_parts, width = 40)
 }
 
-# A colour for the action that is taken in each cell.
+# Fills each cell with the colour of the action that is taken there.
 taken_layers <- function(data) {
   cells <- data$cells[!is.na(data$cells$action), ]
   cells$shown <- shown_actions(cells$action, data$numbers, data$labels)
@@ -185,8 +186,8 @@ taken_layers <- function(data) {
   )
 }
 
-# The parts on the axes are the columns and the rows; `panels` are those of the other parts that
-# have several values.
+# The parts on the axes become columns and rows. The other parts become `panels` if they have
+# several values.
 parts_map_data <- function(x) {
   cells <- x$grid
   counts <- lengths(lapply(cells[c(x$x, x$y, x$panels)], unique))

@@ -42,7 +42,7 @@ filmstrip <- function(stills) {
     )
 }
 
-# As many frames in a row as are still large.
+# How many frames fit in a row and stay large.
 film_columns <- function(pictures) {
   wide <- ncol(pictures[[1L]]) > 2 * nrow(pictures[[1L]])
   min(length(pictures), if (wide) 2L else 4L)
@@ -72,8 +72,8 @@ busy_span <- function(busy) {
   seq(max(1, min(which(busy)) - around), min(length(busy), max(which(busy)) + around))
 }
 
-# Graphics devices drop most pixels of a large picture, and thin lines with them. So make it smaller
-# first: at least this wide, and less than twice as wide.
+# A graphics device drops most pixels of a large picture, and so loses thin lines. Shrink the
+# picture first, but keep at least this width. The result is less than twice as wide.
 most_pixels <- 300L
 
 #' Make a picture smaller: each pixel the mean of a square

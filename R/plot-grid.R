@@ -1,7 +1,7 @@
-# States on a grid: where they are and what is drawn in their cells.
+# Draws states on a grid: finds their places and what to draw in their cells.
 
-# A picture of cells with the columns `row` and `column`. `layers` are below the environment's
-# marks. Parts of an observation have axes, and panels for the others.
+# Draws cells, which have the columns `row` and `column`. `layers` come below the environment's
+# marks. If the cells are parts of an observation, two parts have axes and the others have panels.
 grid_picture <- function(data, layers) {
   axes <- data$axes
   picture <- ggplot2::ggplot(data$cells, ggplot2::aes(.data$column, .data$row)) +
@@ -42,7 +42,7 @@ grid_picture <- function(data, layers) {
 # The width of a square cell in millimetres, if the picture is four inches wide.
 cell_width <- function(data) min(91 / data$columns, 56 / data$rows)
 
-# Without a size ggplot2 makes cells as large as the distance between them.
+# Gives cells the size 1. Without a size, ggplot2 makes them as large as the distance between them.
 cell_tiles <- function(mapping = NULL, ...) {
   ggplot2::geom_tile(mapping, ..., width = 1, height = 1, colour = "grey80", linewidth = 0.3)
 }
@@ -85,12 +85,12 @@ action_layers <- function(data, cells, above = 0) {
 
 number_texts <- function(values) {
   largest <- max(abs(values[is.finite(values)]), 1e-6)
-  # Three digits, with as many decimals for 1 as for 0.99.
+  # Show three digits. The small number makes 1 have as many decimals as 0.99.
   decimals <- max(0, 1 - floor(log10(largest) - 1e-6))
   ifelse(is.na(values), "", fixed_texts(values, decimals))
 }
 
-# Without the sign of a number that is rounded to 0.
+# Rounds numbers, and leaves out the minus sign of a number that is rounded to 0.
 fixed_texts <- function(values, decimals) {
   sub("^-(0[.]?0*)$", "\\1", sprintf("%.*f", as.integer(decimals), values))
 }
@@ -115,19 +115,21 @@ taxi_stands <- data.frame(
   label = c("R", "G", "Y", "B"), row = c(1, 1, 5, 5), column = c(1, 5, 1, 4)
 )
 
-# Which of Gymnasium's grids it is, or "".
+# The name of Gymnasium's grid that this environment is, or "".
 known_grid <- function(id) {
   found <- names(known_directions)[startsWith(id %||% "", names(known_directions))]
   if (length(found)) found else ""
 }
 
-# Puts states into Taxi's city, or into a grid. `model` is that of the environment, if it is known.
+# Finds the places of states in Taxi's city or on a grid. `model` is the environment's model, if it
+# is known.
 place_states <- function(cells, env_id, spaces, columns, directions, passenger, destination, call,
                          model = NULL) {
   check_count(columns, allow_null = TRUE, call = call)
   known <- known_grid(env_id)
   numbers <- state_numbers(spaces$action_space)
-  # Label actions by `directions`, else as in the known grid, else by their names or numbers.
+  # Label actions by `directions`, otherwise as in the known grid, otherwise by their names or
+  # numbers.
   directions <- directions %||% known_directions[[known]] %||% value_labels(spaces$action_space)
   if (!is.character(directions) || length(directions) != length(numbers)) {
     must <- paste("a string for each of", count_of(length(numbers), "action"))
@@ -173,8 +175,8 @@ numbered_cells <- function(cells, columns, call) {
   list(cells = cells, columns = columns, rows = count / columns)
 }
 
-# The columns of a known grid. A step down adds their number to the state's: it is the most common
-# difference above 1.
+# The number of columns of a known grid. A step down adds this number to the state, so it is the
+# most common difference above 1 between two states.
 grid_columns <- function(known, count, model) {
   if (!is.null(model) && known != "") {
     further <- model$transitions$next_state - model$transitions$state
@@ -186,7 +188,7 @@ grid_columns <- function(known, count, model) {
   }
 }
 
-# The axis of states without a grid, with their names.
+# Makes the axis of states without a grid, with the states' names.
 state_axis <- function(space) {
   if (is.null(space$values)) {
     return(ggplot2::scale_x_continuous(breaks = few_breaks))
@@ -197,8 +199,8 @@ state_axis <- function(space) {
   )
 }
 
-# Taxi's state number encodes the row, the column, the passenger and the destination, see its
-# documentation.
+# Taxi's state number encodes the row, the column, the passenger and the destination, see
+# Gymnasium's documentation of Taxi.
 taxi_cells <- function(cells, passenger, destination, model, call) {
   check_count(passenger, min = 0, max = 4, call = call)
   check_count(destination, min = 0, max = 3, call = call)

@@ -2,12 +2,12 @@
 #'
 #' Draw the diagram of a network: its layers from left to right, neurons as circles, weights as
 #' lines. A line is wider the further its weight is from 0. Positive weights are blue; negative ones
-#' are gold and dashed. Biases are the weights of a circle with a 1, the last of its layer. If
-#' there are few weights, the lines carry their numbers. Dots stand for the neurons that are left
-#' out of a large layer.
+#' are gold and dashed. The last circle of a layer may have a 1 in it: the weights from there are
+#' the biases. If there are few weights, their numbers are written on the lines. Dots stand for
+#' neurons that are left out of a large layer.
 #'
-#' Inputs have the names of the observation's parts, and outputs those of the actions, if the policy
-#' knows its environment: because it was played there, or from `env`.
+#' If the policy was played in an environment, or if you give `env`, inputs have the names of the
+#' observation's parts, and outputs have the names of the actions.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -19,8 +19,8 @@
 #'   was played.
 #' @param neurons The largest number of neurons to draw in a layer, a whole number of at least 3.
 #'   The default is 12.
-#' @param digits The number of digits of the weights on their lines. `NULL`, the default, is 2 for
-#'   up to 24 lines and none for more; 0 writes none.
+#' @param digits The number of digits of the weights on the lines, a whole number. 0 writes no
+#'   numbers. `NULL`, the default, means 2 for up to 24 lines and 0 for more.
 #' @param main The title. `NULL`, the default, names the environment and the sizes of the layers.
 #' @param client The client of the server that is asked about an environment given by its id. The
 #'   default is the session's client, [gym_client()].
@@ -42,7 +42,7 @@
 autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, digits = NULL,
                                         client = gym_client()) {
   check_dots_empty(...)
-  # Without `env` a policy keeps the spaces of the environment in which it was played.
+  # Without `env`, use the spaces of the environment in which the policy was played.
   policy <- if (is.null(env)) object else policy_bind(object, known_spaces(env, client))
   data <- network_plot_data(policy, neurons, digits)
   units <- data$neurons
@@ -67,8 +67,8 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
     ggplot2::geom_point(shape = 21, size = if (crowded) 3.5 else 6, fill = "white") +
     ggplot2::geom_text(ggplot2::aes(label = "1"), units[units$bias, ], size = 3) +
     ggplot2::geom_point(data = dots, size = 0.4) +
-    # White behind a number, so that its line does not cross it; to the right of its place, where it
-    # does not cover the neuron.
+    # Put white behind a number, so that no line crosses it. Write it to the right of its place,
+    # where it does not cover the neuron.
     ggplot2::geom_label(place, numbers, size = 2.8, hjust = 0, colour = "white", fill = "white",
                         label.padding = ggplot2::unit(0.1, "lines")) +
     ggplot2::geom_text(place, numbers, size = 2.8, hjust = -0.06) +
@@ -81,7 +81,7 @@ autoplot.gym_policy_network <- function(object, env = NULL, ..., neurons = 12, d
       name = NULL, limits = unname(name), values = stats::setNames(c("solid", "31"), name),
       guide = rows_of_key(name)
     ) +
-    # The names of inputs and outputs are in the place of axis labels, which has room for them.
+    # Axis labels have room, so write the names of inputs and outputs there.
     ggplot2::scale_x_continuous(
       breaks = data$layers$x, labels = data$layers$label, expand = ggplot2::expansion(mult = 0.07)
     ) +
@@ -116,11 +116,11 @@ autoplot.gym_policy <- function(object, ...) {
 #'
 #' The layers are at x = 0, 1, ..., the neurons between y = 0 and 1.
 #' @return A list: `neurons` (data frame: `layer`, `neuron`, its number in the layer, `x`, `y`,
-#'   `bias`, whether it is the constant 1 whose weights are the biases, and which is then the last
-#'   of its layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, the places of
-#'   left-out neurons), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from
-#'   0 to 1, the places `x`, `y`, `xend`, `yend`, and `label` with its place `label_x`, `label_y`),
-#'   `layers` (data frame `x`, `label`).
+#'   `bias`, whether it is the constant 1 whose weights are the biases, the last neuron of its
+#'   layer, `label`, empty in hidden layers), `dots` (data frame `x`, `y`, the places of left-out
+#'   neurons), `weights` (data frame: `layer`, `from`, `to`, `weight`, `sign`, `width` from 0 to 1,
+#'   the places `x`, `y`, `xend`, `yend`, and `label` with its place `label_x`, `label_y`), `layers`
+#'   (data frame `x`, `label`).
 #' @noRd
 network_plot_data <- function(policy, most = 12, digits = NULL, call = rlang::caller_env()) {
   check_network(policy, call)
@@ -163,7 +163,7 @@ place_weights <- function(policy, neurons, digits) {
   })
   weights <- do.call(rbind, each)
   largest <- max(abs(unlist(policy$weights)))
-  # Where lines are apart, near their beginning.
+  # Put numbers near the beginning of the lines, where the lines are apart.
   along <- 0.26
   weights$label_x <- weights$x + along * (weights$xend - weights$x)
   weights$label_y <- weights$y + along * (weights$yend - weights$y)

@@ -1,53 +1,54 @@
 #' Plot a rollout, or compare several
 #'
-#' There are three pictures of a rollout: the distribution of the returns of all episodes, the
-#' observations and actions of one episode, and the frames of one episode. Several rollouts, or one
-#' of several policies, are compared: a row for each policy shows the distribution of its returns.
-#' Each environment has a column of its own.
+#' Show the returns of all episodes of a rollout, the observations and actions of one episode, or
+#' the frames of one episode. With several rollouts, or a rollout of several policies, the picture
+#' compares the policies: each has a row with the distribution of its returns. Each environment has
+#' its own column.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
 #'
 #' `"returns"` shows the density of the returns, with the median marked, and each episode as a tick
 #' on the axis. Returns that are whole numbers have a histogram of episodes, with a bar for each
-#' number if there are at most 40 from the smallest to the largest. Few different returns, such as
-#' the 0 and 1 of FrozenLake, have a bar each. There are such bars for at most 3 values, or for at
-#' most 10 that occur twice on average. In a comparison all rows have the same height. Of more than
-#' ten policies, the ten with the highest mean returns are shown.
+#' number if there are at most 40 from the smallest to the largest. If there are only few different
+#' returns, such as the 0 and 1 of FrozenLake, each has a bar: for up to 3 different returns, and
+#' for up to 10 if each occurs twice on average. In a comparison all rows have the same height. If
+#' there are more than ten policies, the picture shows the ten with the highest mean returns.
 #'
 #' `"trajectory"` shows each part of an episode's observations in a panel, and the actions below
-#' them, against the number of steps. The labels use the units and the meanings of actions in
-#' Gymnasium's documentation. Dashed lines are limits at which an episode ends by that documentation
-#' (in CartPole the cart beyond 2.4 m, the pole beyond 12 degrees), drawn if the episode comes near.
-#' A solid line is the end. The observations are those before each action; the last one is not
-#' shown. This needs a rollout with `steps = TRUE`. If a wrapper changes observations, as
-#' `NormalizeObservation` does, the labels are `obs_1` and so on, without limits.
+#' them, over the steps of the episode. This needs a rollout with `steps = TRUE`. The labels use the
+#' units and the meanings of actions in Gymnasium's documentation. Dashed lines are limits at which
+#' an episode ends, from the same documentation (in CartPole the cart at 2.4 m and the pole at 12
+#' degrees). A limit is drawn only if the episode comes near. A solid line marks the end. The
+#' picture shows the observation before each action, so the last observation is missing. If a
+#' wrapper changes observations, as `NormalizeObservation` does, the labels are `obs_1` and so on,
+#' without limits.
 #'
 #' `"filmstrip"` shows evenly spaced frames of an episode, including the first and the last, four in
-#' a row, or two if they are wide. Blank space around is cut off if all frames have it. This needs a
+#' a row, or two if they are wide. A blank border is cut off if all frames have it. This needs a
 #' rollout with `frames = TRUE`, and the package png.
 #'
-#' @param x,object The result of [rollout()]. You may give it another name, which is then the name
-#'   of its row: `plot(random = played_1, network = played_2)`.
+#' @param x,object The result of [rollout()]. You may give the argument another name, which then
+#'   names its row: `plot(random = played_1, network = played_2)`.
 #' @param type `"returns"`, the default, `"trajectory"` or `"filmstrip"`.
 #' @param episode The episode to show, a whole number. The default is the first.
 #' @param variables The parts of the observation in a trajectory: names of columns of the table of
-#'   steps, such as `"pole_angle"`, also `"reward"`. `NULL`, the default, shows the first 8.
+#'   steps, such as `"pole_angle"` or `"reward"`. `NULL`, the default, shows the first 8 parts.
 #' @param n The largest number of frames in a filmstrip, a whole number. The default is 8.
 #' @param candidate The candidate whose episode to show, if several policies were played, a whole
 #'   number. The default is the first.
 #' @param ... For `"returns"`, further rollouts to compare, optionally with names for their rows.
 #'   `plot()` passes its arguments to `autoplot()`.
 #' @param main The title. `NULL`, the default, names the environment.
-#' @param xlab,ylab The axes' labels, strings. `NULL`, the default, for the picture's own.
-#' @param xlim,ylim The part of the axes to show, two numbers each. `NULL`, the default, for all.
+#' @param xlab,ylab The axes' labels, strings. `NULL`, the default, keeps those of the picture.
+#' @param xlim,ylim The ranges of the axes to show, two numbers each. `NULL`, the default, shows
+#'   everything.
 #' @param guide `"none"` draws the picture without its key. `NULL`, the default, draws it.
 #' @return A ggplot. `plot()` returns it invisibly.
 #' @section Errors: `gym_error_argument` for an invalid argument, or a rollout without the steps or
 #'   frames to be shown.
-#' @references The density is that of [stats::density()] with its default bandwidth, within
-#'   the range of the returns, as in the figure of the tutorial *Artificial Intelligence in R (I)*
-#'   (2018).
+#' @references The density is that of [stats::density()] with its default bandwidth, over the range
+#'   of the returns, as in the figure of the tutorial *Artificial Intelligence in R (I)* (2018).
 #' @seealso [animate()] for an animation.
 #' @rdname plot.gym_rollout
 #' @exportS3Method ggplot2::autoplot
@@ -55,7 +56,7 @@
 #' random <- rollout("CartPole-v1", policy_random(), episodes = 50, seed = 1)
 #' plot(random)
 #'
-#' # As any picture of ggplot2.
+#' # Change it like any ggplot.
 #' library(ggplot2)
 #' autoplot(random) + theme_bw() + labs(title = "Chance")
 #'
@@ -107,7 +108,7 @@ given_rollouts <- function(values, call = rlang::caller_env()) {
 
 # Returns ------------------------------------------------------------------------------
 
-# The distribution of the returns of a rollout's episodes.
+# Draws the distribution of the returns of a rollout's episodes.
 
 returns_picture <- function(x) {
   returns <- x$episodes$return
@@ -152,7 +153,8 @@ returns_picture <- function(x) {
     theme_gym()
 }
 
-# Bins are whole numbers wide, and end at the largest return, which may be the largest possible one.
+# Bins are whole numbers wide. The last bin ends at the largest return, because this may be the
+# largest possible return.
 bin_width <- function(returns) max(1, ceiling((diff(range(returns)) + 1) / most_bins))
 
 most_bins <- 40L
@@ -164,13 +166,13 @@ has_few <- function(returns) {
   length(unique(returns)) <= min(most_bars, max(3, length(returns) / 2))
 }
 
-# How returns are drawn: few different ones as bars, other whole numbers as a histogram.
+# How to draw returns: a few different ones as bars, other whole numbers as a histogram.
 returns_kind <- function(returns) {
   if (has_few(returns)) "bars" else if (all_whole(returns)) "histogram" else "density"
 }
 
-# Bars are as wide as the two nearest values allow, and those of whole numbers at most 1, but wide
-# enough to be seen among `all` values.
+# Bars are as wide as the two nearest values allow; for whole numbers the width is at most 1. But
+# bars are always wide enough to see among `all` values.
 bar_width <- function(values, all = values) {
   values <- sort(unique(values))
   if (!length(values)) {

@@ -1,23 +1,25 @@
 #' Plot the values of a solved model
 #'
 #' Show the value of each state as a colour (darker is lower) and its best action as an arrow or a
-#' letter. Supported grids are FrozenLake, CliffWalking, Taxi (for one passenger and destination)
-#' and any other grid whose `columns` you give. Marks show goals and pits, where episodes end. Cells
-#' that an episode never enters, such as walls, are empty. Other models have a point for each state,
-#' and the actions in a panel of their own.
+#' letter. FrozenLake, CliffWalking and Taxi (for one passenger and destination) are drawn as grids,
+#' and so is any other model if you give `columns`. Marks show goals and pits, where episodes end.
+#' Cells that an episode never enters, such as walls, are empty. Without a grid, each state has a
+#' point, and the actions have their own panel.
 #'
 #' `type = "q"` shows the value of each action. Each cell has a triangle for each direction, with
 #' the best one in bold. Actions that are not directions are left out. Without a grid, each action
 #' has a row, with a dot at the best one.
 #'
 #' If all terminal states give the same reward, they are goals, unless other steps give more on
-#' average. Otherwise those with the largest reward are goals and the others are pits.
+#' average. Otherwise the terminal states with the largest reward are goals, and the others are
+#' pits.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
 #'
-#' States with two columns of names, such as `row` and `column`, are a grid of these: the first
-#' down, the second to the right. Each value of further columns has a panel.
+#' If states have two columns of names, such as `row` and `column`, these make the grid: the first
+#' column goes down, the second to the right. If there are more columns, each of their values has a
+#' panel.
 #'
 #' @inheritParams plot.gym_rollout
 #' @param x,object The result of [solve_mdp()].
@@ -37,7 +39,7 @@
 #' @rdname plot.gym_solution
 #' @exportS3Method ggplot2::autoplot
 #' @examples
-#' # Four by three fields; the upper right one is the goal.
+#' # A grid of four by three fields; the goal is at the upper right.
 #' fields <- expand.grid(action = 0:3, state = setdiff(0:11, 3))
 #' row <- fields$state %/% 4 + c(0, 1, 0, -1)[fields$action + 1]
 #' column <- fields$state %% 4 + c(-1, 0, 1, 0)[fields$action + 1]
@@ -105,7 +107,7 @@ solution_plot_data <- function(x, columns, directions, passenger, destination, s
   placed
 }
 
-# Is the end of an episode a goal or a pit? The rewards on arrival decide.
+# Is a terminal state a goal or a pit? The rewards on arrival decide.
 end_kinds <- function(model, moves = ways_of(model)) {
   arrives <- moves$terminated & moves$reached[moves$from] & !moves$reached[moves$to]
   reward <- as.vector(tapply(
@@ -131,7 +133,7 @@ q_of_cells <- function(q, states, data) {
     ],
     direction = rep(data$directions, each = nrow(cells)),
     action = rep(data$numbers, each = nrow(cells)), q = as.vector(q),
-    # Equal values may differ by rounding.
+    # Rounding may make equal values differ.
     best = as.vector(q >= most - 1e-9 * pmax(1, abs(most))), row.names = NULL
   )
   each[is.finite(each$q), ]
@@ -142,7 +144,7 @@ q_of_cells <- function(q, states, data) {
 value_layers <- function(data) {
   cells <- data$cells[!is.na(data$cells$value), ]
   size <- text_size(data, cells$text)
-  # Below the actions, if there are any.
+  # Write values below the actions, if there are any.
   below <- if (any(nzchar(cells$does))) 0.3 else 0
   c(
     list(cell_tiles(ggplot2::aes(fill = .data$value), cells), value_fill()),
@@ -157,8 +159,8 @@ value_layers <- function(data) {
 
 value_fill <- function() continuous_fill("value", value_colours())
 
-# The corners of a triangle: the two of the side to which an action leads, and the middle of the
-# cell.
+# An action's triangle has three corners: the middle of the cell, and both ends of the side to which
+# the action leads.
 q_layers <- function(data) {
   moves <- data$q[data$q$direction %in% names(arrow_steps), ]
   moves$cell <- seq_len(nrow(moves))
@@ -174,7 +176,7 @@ q_layers <- function(data) {
   moves$y <- moves$row + 0.34 * step[, 2L]
   moves$text <- number_texts(moves$q)
   moves$ink <- ink_on(moves$q)
-  # Two numbers are side by side.
+  # Two numbers must fit side by side.
   size <- text_size(data, strrep("0", 2 * nchar(moves$text) + 3))
   c(
     list(
@@ -204,7 +206,7 @@ end_layers <- function(data) {
   )
 }
 
-# Points with the mark of their `kind`, and the key.
+# Draws points with the mark of their `kind`, and the key.
 marked_points <- function(points, size) {
   marks <- list(
     value = key_mark("blue", shape = 16), goal = key_mark("green", shape = 18),
@@ -261,7 +263,7 @@ action_panel <- function(data) {
   paste0("action", if (named) paste0(" (", toString(paste(data$numbers, data$directions)), ")"))
 }
 
-# The value of each action in each state: a row for each action.
+# Draws the value of each action in each state, with a row for each action.
 q_cells <- function(data) {
   ggplot2::ggplot(data$q, ggplot2::aes(.data$state, .data$action)) +
     ggplot2::geom_tile(ggplot2::aes(fill = .data$q), width = 1, height = 1) +
@@ -274,7 +276,7 @@ q_cells <- function(data) {
     state_axes(data)
 }
 
-# States by actions. Few actions have their names on the axis.
+# Makes the axes of states and actions. If there are few actions, the axis shows their names.
 state_axes <- function(data) {
   few <- length(data$numbers) <= most_named_actions
   names <- ifelse(data$directions == data$numbers, data$labels, data$directions)

@@ -1,4 +1,4 @@
-# Shared by all pictures: the colours, the theme, the text above and the key.
+# What all pictures share: the colours, the theme, titles and labels, and the key.
 
 # Colours that remain distinct for colour-blind readers (simulated as by Machado, Oliveira and
 # Fernandes, 2009) and in grey, because each is lighter than the one before it in this order: blue,
@@ -11,15 +11,15 @@ gym_colours <- c(
 # For lines and areas that differ by colour alone.
 series_colours <- unname(gym_colours[c("blue", "gold", "purple", "green", "brown", "sky")])
 
-# More labels than there are colours have colours that are less distinct, but no two the same.
+# If there are more labels than colours, the colours are less distinct, but still all different.
 named_colours <- function(labels) {
   n <- length(labels)
   enough <- n <= length(series_colours)
   stats::setNames(if (enough) series_colours[seq_len(n)] else grDevices::hcl.colors(n), labels)
 }
 
-# From low to high, light enough at both ends for black text. The lightness of the ends differs,
-# too.
+# From low to high. Both ends are light enough for black text, but not equally light, so that they
+# differ in grey, too.
 diverging_colours <- c("#EFB549", "#FAF7F0", "#4797C8")
 
 # For regions and cells with a colour for each action, light enough for black text.
@@ -37,7 +37,7 @@ shown_actions <- function(actions, numbers, labels) {
   if (named) factor(labels[match(actions, numbers)], labels) else actions
 }
 
-# The scale of these values. `taken` are those that the key shows.
+# The colour scale of actions. `taken` are the labels that the key shows.
 action_fill <- function(numbers, labels, name = NULL, taken = labels, guide = rows_of_key(taken)) {
   if (length(numbers) > most_named_actions) {
     return(continuous_fill("action", c("#FBF3C9", "#7FC9B3", "#4797C8"), limits = range(numbers)))
@@ -70,7 +70,7 @@ theme_gym <- function() {
     )
 }
 
-# For pictures of many panels, which are small.
+# For pictures with many small panels.
 theme_gym_panels <- function() {
   theme_gym() +
     ggplot2::theme(
@@ -87,8 +87,8 @@ theme_gym_bare <- function() {
   )
 }
 
-# Breaks the text around a picture into lines that fit four inches: ggplot2 cuts off longer ones. If
-# a subtitle does not fit one line, each part gets its own.
+# Breaks the text around a picture into lines that fit four inches, because ggplot2 cuts off longer
+# lines. If a subtitle does not fit in one line, each of its parts gets a line.
 picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, caption = NULL) {
   axes <- axis_labels(...)
   joined <- paste(subtitle, collapse = ", ")
@@ -100,7 +100,8 @@ picture_labels <- function(title = NULL, subtitle = NULL, ..., width = 54, capti
   )
 }
 
-# The labels of axes, in lines that fit: the vertical axis of a small picture is two inches long.
+# Breaks the labels of axes into lines that fit. The vertical axis of a small picture is two inches
+# long.
 axis_labels <- function(...) {
   given <- list(...)
   widths <- c(x = 44, y = 24)
@@ -113,7 +114,7 @@ broken_text <- function(text, width) {
   if (length(text) && nzchar(text)) paste(broken_texts(text, width), collapse = "\n")
 }
 
-# Lines of this width at most, of each text. Words that are longer, such as ids, are broken, too.
+# Breaks each text into lines of at most this width. Longer words, such as ids, are broken, too.
 broken_texts <- function(texts, width) {
   vapply(strwrap(texts, width, simplify = FALSE), function(lines) {
     cut <- gsub(paste0("(\\S{", as.integer(width), "})(?=\\S)"), "\\1\n", lines, perl = TRUE)
@@ -151,7 +152,7 @@ line_marks <- function(labels) {
   lapply(named_colours(labels), function(colour) list(colour = colour, shape = NA, line = "solid"))
 }
 
-# What is longer than a line of the key is broken.
+# Breaks labels that are longer than a line of the key.
 key_labels <- function(labels) broken_texts(labels, 46)
 
 # A key with as many rows as fit into four inches.
@@ -172,12 +173,12 @@ continuous_fill <- function(name, colours, ...) {
   )
 }
 
-# The targets of several environments have one place in the key.
+# The targets of several environments share one place in the key.
 target_label <- function(target) {
   paste(c("target", if (length(target) == 1L) number_text(target)), collapse = " ")
 }
 
-# The line of the target, if there is one, or one for each environment.
+# Draws the line of the target, if there is one, or a line for each environment.
 target_line <- function(target, ...) {
   if (length(target)) {
     ggplot2::geom_hline(
@@ -198,16 +199,16 @@ finite_target <- function(target) if (!is.null(target) && is.finite(target)) tar
 
 number_axis <- function(scale, ...) scale(labels = axis_numbers, ...)
 
-# All numbers of an axis have one form.
+# Gives all numbers of an axis the same form.
 axis_numbers <- function(at) ifelse(is.na(at), NA, number_text(at, trim = TRUE))
 
-# The panels' titles, one line each if they fit half of four inches.
+# Breaks the panels' titles if they do not fit in half of four inches.
 wrapped_strips <- function(columns = 2) {
   ggplot2::as_labeller(function(labels) broken_texts(labels, 66 %/% columns))
 }
 
-# Axis marks: all whole numbers if there are few, because actions are whole. `pretty()` may give
-# more than asked for.
+# Axis marks. If there are few whole numbers, mark them all, because actions are whole numbers.
+# `pretty()` may give more marks than asked for.
 few_breaks <- function(limits, n = 5) {
   from <- ceiling(limits[[1L]])
   to <- floor(limits[[2L]])
@@ -224,14 +225,14 @@ training_steps_label <- "steps of the environment"
 
 # plot() -------------------------------------------------------------------------------
 
-# plot() of a result prints the picture made by autoplot(). Printing needs ggplot2's namespace,
-# which is loaded by the first picture and not with this package.
+# plot() of a result prints the picture that autoplot() makes. Printing needs ggplot2's namespace.
+# The first picture loads it, so loading this package stays fast.
 
 show_picture <- function(x, ..., main = NULL, xlab = NULL, ylab = NULL, xlim = NULL, ylim = NULL,
                          guide = NULL) {
   arguments <- arguments_as_written(quote(x))
-  # Results are passed as variables that know their names: an argument with a name such as `episode`
-  # would be taken for one of autoplot().
+  # Pass results without names, in variables that know their names. Otherwise a result that the user
+  # named `episode` would become this argument of autoplot().
   named <- which(vapply(arguments, is_comparable, NA))
   names(arguments) <- rlang::names2(arguments)
   labelled <- Map(structure, arguments[named], label = names(arguments)[named])

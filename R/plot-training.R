@@ -1,9 +1,9 @@
 #' Plot a training
 #'
 #' Show a training over the steps of the environment. The band is the range of the returns of each
-#' iteration (of its candidates, or of its episodes for an agent that learns from steps), and the
-#' line is their median. Points are evaluations of the agent's own policy. The dashed line is the
-#' target. The filled point at the end is the final evaluation, with its interval.
+#' iteration (the returns of its candidates, or of its episodes if the agent learns from steps), and
+#' the line is the median return. Points are evaluations of the agent's own policy. The dashed line
+#' is the target. The filled point at the end is the final evaluation, with its interval.
 #'
 #' `type = "diagnostics"` shows the numbers that the agent logs (see [agent_log()]), one per panel.
 #' For PPO (see [agent_ppo()]): the policy moves too far in an iteration if `approx_kl` is far above
@@ -16,8 +16,8 @@
 #' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object A training, as returned by [train_agent()]. You may give it another name, which
-#'   is then the name of its line, as in `plot(ARS = first, CEM = second)`.
+#' @param x,object A training, as returned by [train_agent()]. You may give the argument another
+#'   name, which then names its line, as in `plot(ARS = first, CEM = second)`.
 #' @param main The title. `NULL`, the default, names the environment and the agent.
 #' @param type What to show, a string: `"returns"`, the default, or `"diagnostics"`, for a single
 #'   training.
@@ -49,7 +49,7 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
   }
   evaluations <- x$evaluations
   evaluations$steps <- evaluation_steps(x)
-  # If there are several final evaluations, use the last.
+  # If there are several final evaluations, show the last one.
   earlier <- evaluations$kind == "final" & duplicated(evaluations$kind, fromLast = TRUE)
   evaluations <- evaluations[!earlier, ]
   final <- evaluations[evaluations$kind == "final", ]
@@ -91,7 +91,7 @@ autoplot.gym_training <- function(object, ..., type = c("returns", "diagnostics"
 #' Plot a search
 #'
 #' Show every episode of a search as a point, the mean of each round as a line, and the target as a
-#' dashed line. Points of a round with almost the same return are side by side.
+#' dashed line. Points with almost the same return in the same round are side by side.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -131,12 +131,12 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
   target <- finite_target(object$target)
   ggplot2::ggplot(object$episodes, ggplot2::aes(.data$round, .data$return)) +
     target_line(target) +
-    # With its own seed the jitter leaves R's generator unchanged.
+    # With its own seed, the jitter leaves R's generator unchanged.
     ggplot2::geom_point(
       ggplot2::aes(colour = "episode"), size = 1.8,
       position = ggplot2::position_jitter(width = 0.25, height = 0, seed = 1)
     ) +
-    # ggplot2 shows a message for a line of one point.
+    # For a line of one point ggplot2 shows a message, so leave it out.
     (if (nrow(means) > 1L) ggplot2::geom_line(
       ggplot2::aes(.data$round, .data$mean_return, colour = "mean of the round"), means,
       linewidth = 0.7
@@ -162,8 +162,8 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
 
 #' Plot what bandit learners achieved
 #'
-#' Show the mean reward of all learners, or the share that took the best arm, at each step. Several
-#' results are compared in one picture.
+#' Show the mean reward of all learners at each step, or the share of learners that took the best
+#' arm. Give several results to compare them.
 #'
 #' `autoplot()` returns a ggplot, to which you can add scales, themes and layers. `plot()` also
 #' prints it.
@@ -183,7 +183,7 @@ autoplot.gym_search <- function(object, type = c("returns", "network"), ...) {
 #' many <- learn_bandit(testbed, epsilon = 0.1, learners = 200, seed = 1)
 #' plot(few, many, what = "best_share")
 autoplot.gym_bandit_learning <- function(object, ..., what = c("mean_reward", "best_share")) {
-  # Every result may have a name, the first one, too.
+  # If all results have names, even the first one is in the dots.
   runs <- if (missing(object)) list(...) else list(object, ...)
   what <- check_choice(what[1L], c("mean_reward", "best_share"), arg = "what")
   curves <- bandit_curves(runs, what)

@@ -1,17 +1,17 @@
-# Several trainings in one picture: with many seeds, and of several agents.
+# Draws several trainings in one picture: of many seeds, or of several agents.
 
 #' Plot trainings
 #'
-#' Show the returns of the agents' own policies over the steps of the environment. For trainings
+#' Show the mean returns of the agents' policies over the steps of the environment. For trainings
 #' with several seeds ([gym_trainings]), the line is the median of the seeds and the band their
 #' middle half. For a single training, the line connects its evaluations. The dashed line is the
 #' target. Several trainings are compared in one picture, which has a panel for each environment.
 #'
-#' `type = "iterations"` shows how many iterations the seeds needed until they had reached the
-#' target, as bars. Seeds that have not reached it are counted in the text.
+#' `type = "iterations"` shows bars of how many iterations the seeds needed to reach the target. The
+#' text says how many seeds reached it.
 #'
 #' Between two evaluations the return is interpolated linearly. The line of several seeds is thick
-#' while all of them train. It becomes thin when the first one ends; a seed that has ended counts
+#' while all of them train. It becomes thin when the first seed ends; after its end, a seed counts
 #' with its last evaluation. The line of a single training is thin after its end, too. The picture
 #' begins when all seeds have an evaluation. If targets, budgets or rules of evaluation differ in
 #' one environment, the caption names them.
@@ -20,10 +20,10 @@
 #' prints it.
 #'
 #' @inheritParams plot.gym_rollout
-#' @param x,object Trainings, as returned by `train_agent(seeds = )`. You may give them another
-#'   name, which is then the name of their line, as in `plot(ARS = first, CEM = second)`.
-#' @param type What to show, a string: `"returns"` or `"iterations"`. The default is `"returns"`; of
-#'   searches by [search_random()], which have no evaluations, it is `"iterations"`.
+#' @param x,object Trainings, as returned by `train_agent(seeds = )`. You may give the argument
+#'   another name, which then names their line, as in `plot(ARS = first, CEM = second)`.
+#' @param type What to show, a string: `"returns"` or `"iterations"`. The default is `"returns"`.
+#'   For searches by [search_random()] it is `"iterations"`, because a search has no evaluations.
 #' @param ... Further trainings to compare, of class `gym_trainings` or `gym_training`, optionally
 #'   with names for their lines.
 #' @param main The title. `NULL`, the default, names the environment, the agent and the number of
@@ -163,11 +163,11 @@ evaluation_curves <- function(x, label, call) {
 
 #' Compute the line and the band of one training or several seeds
 #' @param each The result of [evaluation_curves()].
-#' @param last Where the panel ends, in steps.
+#' @param last The number of steps at which the panel ends.
 #' @param training The number of the training.
 #' @return A data frame with a row for each place: `label`, `training`, `steps`, `median`, `lower`,
 #'   `upper` of the seeds, `ended`, whether a seed had ended before, and `first_end`, the place
-#'   where the first one ended.
+#'   where the first seed ended.
 #' @noRd
 trainings_curve <- function(each, label, last, training) {
   from <- max(vapply(each, function(curve) min(curve$steps), 0))
@@ -209,7 +209,8 @@ autoplot.gym_sweep <- function(object, ...) {
   trained <- Filter(Negate(is.null), object$trainings)
   target <- common_target(trained)
   picture <- trainings_picture(trained)
-  # The panels' titles replace the key, which would name the target.
+  # There is no key, which would name the target, because the panels have titles. So the subtitle
+  # names it.
   dashed <- if (!is.null(target)) paste("dashed line:", target_label(target))
   titles <- varied_settings(names(trained))
   picture +
@@ -227,8 +228,8 @@ autoplot.gym_sweep <- function(object, ...) {
     ggplot2::theme(legend.position = "none")
 }
 
-# Splits the names of settings, such as "step_size = 0.1, noise = 0.05", into what they share and
-# the rest, which the panels' titles need not repeat.
+# Splits the names of settings, such as "step_size = 0.1, noise = 0.05", into the part that they
+# share and the part that varies. The panels' titles show only the second.
 varied_settings <- function(names) {
   parts <- strsplit(names, ", ", fixed = TRUE)
   shared <- if (length(names) > 1L) Reduce(intersect, parts)
@@ -241,8 +242,8 @@ varied_settings <- function(names) {
 
 # Diagnostics --------------------------------------------------------------------------
 
-# The numbers that an agent logs about its learning, which show why it does not learn: a panel for
-# each number over the steps of the training.
+# Draws the numbers that an agent logs about its learning, each in a panel over the steps of the
+# training. They help to find out why an agent does not learn.
 
 diagnostics_picture <- function(x, call = rlang::caller_env()) {
   names <- names(agent_log(x$agent))
@@ -255,10 +256,10 @@ diagnostics_picture <- function(x, call = rlang::caller_env()) {
     data.frame(steps = x$history$steps, name = name, value = x$history[[name]])
   }))
   rows$name <- factor(rows$name, names)
-  # The agent learned nothing from the first, random episodes and has no numbers there.
+  # In the first, random episodes an agent may not learn yet, so it has no numbers there.
   rows <- rows[is.finite(rows$value), ]
-  # By default ggplot2 makes the axis of a constant 0.1 long, on which a small number looks like 0.
-  # Here it reaches from half the number to one and a half.
+  # If a number is constant, ggplot2 makes its axis 0.1 long, and a small number looks like 0. So
+  # let the axis reach from half the number to one and a half times the number.
   spread <- stats::ave(rows$value, as.character(rows$name), FUN = function(x) diff(range(x)))
   constant <- rows[spread == 0, ]
   ggplot2::ggplot(rows, ggplot2::aes(.data$steps, .data$value)) +

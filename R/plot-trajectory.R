@@ -1,4 +1,4 @@
-# An episode's observations and actions over its steps.
+# Draws an episode's observations and actions over its steps.
 
 trajectory_picture <- function(x, data) {
   values <- data$values
@@ -26,7 +26,7 @@ trajectory_picture <- function(x, data) {
       )
     }) +
     choice_layers(of_kind("choice"), data$choices) +
-    # The numbers of an action share a panel and have a key; other lines have one colour.
+    # The numbers of an action share a panel and have a key. All other lines have the same colour.
     ggplot2::scale_colour_manual(
       name = NULL, breaks = named,
       values = c(stats::setNames(gym_colours[["blue"]], ""), named_colours(named)),
@@ -42,7 +42,7 @@ trajectory_picture <- function(x, data) {
     ) +
     picture_labels(env_text(x), c(policy_subtitle(x), data$subtitle), x = "steps taken", y = NULL) +
     theme_gym_panels() +
-    # If the last panel stands alone, the title of its axis is below it.
+    # If the last panel is alone in its row, put the title of the axis below it.
     ggplot2::theme(
       axis.title.x = ggplot2::element_text(hjust = if (panels %% columns) 0.25 else 0.5)
     )
@@ -51,8 +51,8 @@ trajectory_picture <- function(x, data) {
 limit_colours <- c(failure = gym_colours[["brown"]], goal = gym_colours[["green"]])
 ending_colours <- c(terminated = gym_colours[["brown"]], truncated = "grey50")
 
-# Discrete actions: a bar for each step, in the action's place and colour. Actions that never occur
-# have a place, too.
+# Draws discrete actions: a bar for each step, in the action's place and colour. Actions that never
+# occur have a place, too.
 choice_layers <- function(values, choices) {
   if (is.null(choices)) {
     return(NULL)
@@ -75,8 +75,8 @@ choice_layers <- function(values, choices) {
   )
 }
 
-# If a value is constant, the axis of its panel has one mark at this value. ggplot2 passes only the
-# limits of a panel: 0.05 to either side of the constant.
+# If a value is constant, its axis has one mark, at this value. ggplot2 passes only the limits of
+# the panel, which are 0.05 below and above the constant.
 trajectory_breaks <- function(values) {
   shown <- values[values$kind != "choice" & is.finite(values$value), ]
   each <- split(shown$value, shown$panel)
@@ -89,7 +89,7 @@ trajectory_breaks <- function(values) {
 }
 
 most_panels <- 8L
-# There are as many line colours.
+# Each number of an action needs a colour.
 most_actions <- length(series_colours)
 
 #' Compute the data of a trajectory
@@ -139,7 +139,7 @@ trajectory_plot_data <- function(x, episode = 1, variables = NULL, candidate = 1
       time = steps$step - 1L, value = as.numeric(unlist(lapply(values, as.numeric)))
     ),
     limits = limits,
-    # They give the values at which episodes end.
+    # The titles have the values at which episodes end.
     titles = stats::setNames(
       paste0(unique(labels), ifelse(is.na(ends), "", paste0(", ", ends))), unique(labels)
     ),
@@ -252,7 +252,8 @@ trajectory_limits <- function(env_id, observed, labels) {
   limits
 }
 
-# A limit far away would flatten the values, which must keep at least about a tenth of the height.
+# A limit that is far away would flatten the values. They must keep at least about a tenth of the
+# height.
 is_near <- function(at, value) {
   value <- value[is.finite(value)]
   if (!length(value)) {

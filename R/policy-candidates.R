@@ -1,7 +1,7 @@
 #' Make candidates from a matrix of weights
 #'
-#' Candidates are networks with the same sizes and activations and different weights. [rollout()]
-#' and [evaluate_policy()] play them together, which is much faster than one after the other.
+#' Make several networks with the same sizes and activations but different weights. [rollout()] and
+#' [evaluate_policy()] play such candidates together, which is much faster than one after the other.
 #'
 #' @param policy A network, made by [policy_network()], with the sizes and activations of all
 #'   candidates. Its own weights are ignored.
@@ -56,7 +56,7 @@ format.gym_policy_candidates <- function(x, ...) {
 #' Get the policy of some candidates
 #'
 #' @param candidates Their numbers, in increasing order.
-#' @return A policy with these candidates only; for a single one, its own policy.
+#' @return A policy with only these candidates. For a single candidate, its own policy.
 #' @noRd
 policy_subset <- function(policy, candidates) UseMethod("policy_subset")
 
@@ -90,7 +90,7 @@ policy_rows <- function(policy, candidate, sub_env) UseMethod("policy_rows")
 #' @exportS3Method
 policy_rows.default <- function(policy, candidate, sub_env) policy
 
-# The number of candidates, `NULL` for a single policy.
+# The number of candidates, or `NULL` for a single policy.
 count_candidates <- function(policy) {
   if (inherits(policy, "gym_policy_candidates")) {
     nrow(policy$weights)
@@ -99,7 +99,7 @@ count_candidates <- function(policy) {
   }
 }
 
-# Their names, which must be unique, or `NULL`.
+# The candidates' names, which must be unique, or `NULL`.
 candidate_names <- function(policy) {
   names <- if (inherits(policy, "gym_policy_candidates")) {
     rownames(policy$weights)
@@ -146,7 +146,7 @@ act_batch.gym_policy_rows <- function(policy, observation, n, vector_env) {
   network_action(network$action_space, signal, network, one = FALSE)
 }
 
-#' Sum inputs with other weights for each row
+#' Sum inputs with different weights for each row
 #'
 #' @param weights In each row the weight matrix of a layer, column after column: all outputs of the
 #'   first input, then those of the next.

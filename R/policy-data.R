@@ -1,16 +1,16 @@
-# Policies that are data: numbers and a few words, which a server can play without R. They are sent
-# with numbers in C order and with each network's weights in the order of coef().
+# Some policies are only data, numbers and a few words. A server can play them without R. Arrays are
+# sent in C order, and each network's weights in the order of coef().
 
 #' Convert a policy to data
 #'
 #' @param policy A policy that is bound to the environment, or several candidates.
 #' @param env The environment, for its action space.
 #' @return A list: `document`, a list for JSON, and `tensors`, a named list of numeric vectors and
-#'   arrays. `NULL` for a policy that is not data: a function, a model, one with a memory, a user's
-#'   class, or a table for actions of several parts.
+#'   arrays. `NULL` for a policy that is not data: a function, a model, a policy with a memory, a
+#'   user's class, or a table for actions of several parts.
 #' @noRd
 policy_data <- function(policy, env) {
-  # By the first class alone: a subclass may have its own method to act.
+  # Look at the first class alone, because a subclass may have its own method of act().
   switch(
     class(policy)[[1L]],
     gym_policy_network = network_data(policy, rbind(weight_vector(policy))),

@@ -1,26 +1,27 @@
 #' Describe observations by features
 #'
-#' A learner keeps values in a table with a row for each observation. Continuous observations are
-#' too many for a table. Instead, the learner learns a weight for each of some features; the value
-#' of an action is the sum of its weights times the features (Sutton and Barto 2018, chapter 9). Any
-#' function that computes features of an observation works. `tile_coding()` makes one that works
-#' well if observations have few numbers.
+#' Describe observations by features if there are too many different ones for a table of values, as
+#' with continuous observations. A learner then learns a weight for each action and feature. The
+#' value of an action is the sum of its weights times the features (Sutton and Barto 2018, chapter
+#' 9). You can give a learner any function that computes the features of observations.
+#' `tile_coding()` makes features that work well if an observation has few numbers.
 #'
 #' Tile coding covers the range of observations with several grids that are shifted against each
-#' other (Sutton and Barto 2018, section 9.5.4). A feature is a tile: 1 for the tile of each grid
-#' that contains the observation, 0 for all others. Numbers outside the range belong to the
-#' outermost tiles. The grids are shifted by 1, 3, 5, ... parts of a tile in the first, second,
-#' third, ... number.
+#' other (Sutton and Barto 2018, section 9.5.4). Each tile is a feature. It is 1 if the tile
+#' contains the observation and 0 otherwise, so in each grid one tile is 1. Numbers outside the
+#' range belong to the outermost tiles. With n grids, each grid is shifted against the one before by
+#' 1/n of a tile in the first number of an observation, 3/n in the second, 5/n in the third, and so
+#' on.
 #'
 #' @param tilings The number of grids, a whole number of at least 1. The default is 8.
 #' @param bins The number of tiles of a grid along each number of an observation: a whole number of
-#'   at least 1, 8 by default, or one for each number.
+#'   at least 1, or one for each number. The default is 8.
 #' @param low,high The range of each number, numeric vectors. `NULL`, the default, uses the bounds
 #'   of the observation space. The numbers of a Discrete space have the width 1: with `tilings = 1`
 #'   the states form `bins` groups (state aggregation).
 #' @return An object of class `gym_features`, for the argument `features` of [learn_q()] and other
 #'   learners.
-#' @section Errors: `gym_error_argument` for an invalid argument, or, when it is played, for
+#' @section Errors: `gym_error_argument` for an invalid argument. Learning raises it for
 #'   observations that are not numbers or have no bounds.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
@@ -58,14 +59,15 @@ print.gym_features <- function(x, ...) print_lines(x, paste0("<features: ", form
 
 #' Describe the features of an environment's observations
 #'
-#' With a table or tiles only few features of an observation are 1 and all others 0. Then `of()`
-#' returns a matrix with a row for each observation and the numbers of these features in it; there
-#' are `each` of them. For a user's function it returns the features themselves, and `each` is
+#' With a table or tiles, only a few features of an observation are 1 and all others are 0. Then
+#' `of()` returns a matrix with a row for each observation; the row has the numbers of the `each`
+#' features that are 1. For a user's function, `of()` returns the features themselves, and `each` is
 #' `NULL`.
 #' @param features `NULL` for a table, the result of [tile_coding()], or a function.
 #' @return A list: `count`, the number of features, `each`, `of`, a function of a batch of
-#'   observations and their number, `one`, a function of a batch of one that returns its row as a
-#'   vector, and `features`, as given. `count` is `NA` for a function that was not called yet.
+#'   observations and their number, `one`, a function of a batch of one observation that returns its
+#'   row as a vector, and `features`, as given. `count` is `NA` until a user's function has been
+#'   called.
 #' @noRd
 basis_of <- function(features, space, call) {
   if (is.null(features)) {
@@ -108,11 +110,11 @@ tiles_of <- function(features, space, call) {
     any(unbounded), "features", features, call,
     "Number {which(unbounded)[[1L]]} of an observation has no range: its bounds are
      {low[unbounded][[1L]]} and {high[unbounded][[1L]]}.",
-    i = "Give `tile_coding(low = , high = )`, with a number for each of an observation's."
+    i = "Give `tile_coding(low = , high = )`, one number for each number of an observation."
   )
   bins <- rep_len(features$bins, numbers)
   tilings <- features$tilings
-  # One tile more than bins, because all grids but the first are shifted.
+  # Each direction has one more tile than bins, because all grids but the first are shifted.
   weights <- c(1, cumprod(bins + 1))
   per_tiling <- weights[[numbers + 1L]]
   abort_if(
@@ -131,7 +133,7 @@ tiles_of <- function(features, space, call) {
       must <- paste0("of ", count_of(numbers, "number"), " each, as in ", format(space))
       abort_argument(observation, must, "observation", call)
     }
-    # In tiles from the lower bound, within the range; a column for each observation.
+    # The distance from the lower bound in tiles, cut to the range. A column for each observation.
     place <- (t(matrix(observation, n)) - low) / width
     place <- pmin(pmax(place, 0), last)
     of_tiling <- rep(seq_len(tilings), each = n)
@@ -216,8 +218,9 @@ predict_policy.gym_policy_features <- function(policy, newdata, type, call = rla
   feature_values(policy, observed$batch, observed$n)
 }
 
-# A row for each observation. A user's function is not asked about none, and before the first step
-# of training it has no weights, because its number of features is not known.
+# The values of all actions, a row for each observation. A user's function is not called for zero
+# observations. Before the first step of training there are no weights, because the number of its
+# features is not known.
 feature_values <- function(policy, observation, n) {
   if (n == 0L || !nrow(policy$weights)) {
     return(matrix(0, n, ncol(policy$weights)))

@@ -1,4 +1,4 @@
-# Functions as policies. They are called with a batch of observations.
+# Functions as policies. A function is called with a batch of observations.
 
 check_takes_observations <- function(policy, arg, call) {
   # args() is NULL for the few primitives that take any arguments.
@@ -12,8 +12,8 @@ check_takes_observations <- function(policy, arg, call) {
 
 #' Call a function with one observation before the first step
 #'
-#' A function that fails for a single observation would otherwise fail late, when only one episode
-#' is still running.
+#' Some functions fail for a single observation. Without this call they would fail late, when only
+#' one episode is still running.
 #' @param one A batch of one observation.
 #' @noRd
 ask_about_one <- function(policy, one, vector_env) {
@@ -27,8 +27,8 @@ ask_about_one <- function(policy, one, vector_env) {
       gym_abort(
         c("The policy failed for a single observation, before the first step.",
           i = observations_hint(vector_env$observation_space),
-          i = paste("There may be only one, as when all episodes but one have ended;",
-                    "`drop = FALSE` keeps one row of a matrix a matrix."),
+          i = paste("A batch has one observation when all episodes but one have ended.",
+                    "`drop = FALSE` keeps a single row of a matrix a matrix."),
           i = if (inherits(policy, "gym_policy_memory")) memory_form(policy$initial)),
         class = c(own_classes(cnd), "gym_error_argument"),
         argument = "policy", value = policy, call = vector_env$call, parent = cnd
@@ -37,7 +37,7 @@ ask_about_one <- function(policy, one, vector_env) {
   )
 }
 
-# Was it raised by if () or && for several observations? They pass the test with a single one.
+# Did if () or && raise the error for several observations? With a single observation they work.
 is_about_one <- function(cnd) {
   grepl("the condition has length > 1|in coercion to 'logical\\(1\\)'", conditionMessage(cnd))
 }
@@ -54,8 +54,8 @@ abort_about_one <- function(cnd, vector_env) {
 
 #' Convert the result of a function to a batch of actions
 #'
-#' Checks that there is one action for each sub-environment. The environment checks whether each is
-#' an action of its space.
+#' Checks that there is one action for each sub-environment. The environment checks later that each
+#' action is in its space.
 #' @noRd
 batch_actions <- function(actions, n, vector_env) {
   space <- vector_env$action_space
@@ -103,10 +103,10 @@ observations_hint <- function(space) {
 
 actions_hint <- function(space) {
   if (inherits(space, "gym_space_array") && !identical(prod(space$shape), 1)) {
-    paste0("An action of ", format(space), " is a row, and so ", if (length(space$shape) > 1L) {
-      "several are an array with one dimension more, the first."
+    paste0("An action of ", format(space), " is a row, and ", if (length(space$shape) > 1L) {
+      "several actions are an array whose first dimension counts them."
     } else {
-      "several are a matrix."
+      "several actions are a matrix."
     })
   }
 }
@@ -115,21 +115,21 @@ actions_hint <- function(space) {
 
 # Policies with a memory: earlier observations or actions influence the next action.
 #
-# The package keeps the memory, a row for each sub-environment. Episodes that are played together do
-# not share it, and each episode starts with the same one.
+# The package keeps the memory, with a row for each sub-environment. Episodes that are played
+# together do not share a row, and every episode starts with the same memory.
 
 #' Make a policy with a memory
 #'
-#' Make a policy that uses earlier observations: a PID controller, a moving average, a small
-#' recurrent network. The package keeps one memory for each episode and starts every episode with
-#' `initial`, so episodes never share a memory, even if they are played together.
+#' Make a policy that remembers something from step to step: a PID controller, a moving average, a
+#' small recurrent network. The package keeps one memory for each episode and starts every episode
+#' with `initial`, so episodes never share a memory, even if they are played together.
 #'
-#' Such a policy always plays step by step from R. It works everywhere that [rollout()] and
-#' [evaluate_policy()] play: environments on a server, [environments in R][gym_env()], workers, and
-#' in a list with other policies. [saveRDS()] saves it like a function.
+#' Such a policy always plays step by step from R. It works in every environment that [rollout()]
+#' and [evaluate_policy()] play, on a server or [in R][gym_env()], also with workers and in a list
+#' with other policies. [saveRDS()] saves it like a function.
 #'
-#' A plain function that remembers something by `<<-` does not work. [rollout()] passes it several
-#' episodes in one call, and a new episode would start with the memory of another.
+#' A plain function cannot remember anything by `<<-`: one call has the observations of several
+#' episodes, and a new episode would start with the memory of another.
 #'
 #' @param act A function of `observation` and `memory`. `observation` has many observations, as for
 #'   [act()]: for the usual environments a matrix with one in each row. `memory` has as many rows.
@@ -139,9 +139,10 @@ actions_hint <- function(space) {
 #' @param initial The memory at the start of an episode: a numeric vector (its names become column
 #'   names), or a list or data frame of one row.
 #' @return A policy of class `gym_policy_memory`. `act(policy, observation, memory)` returns the
-#'   list that the function returns; without `memory` it starts with `initial`.
-#' @section Errors: `gym_error_argument` for an invalid `act` or `initial`, and, while it is played,
-#'   if `act` does not return the list described above.
+#'   list that the function returns; without `memory`, every observation is the first of an episode
+#'   and has the memory `initial`.
+#' @section Errors: `gym_error_argument` for an invalid `act` or `initial`. Playing raises it if
+#'   `act` does not return the list described above.
 #' @export
 #' @examples
 #' # A PID controller that holds the pole of CartPole upright.
@@ -155,7 +156,7 @@ actions_hint <- function(space) {
 #'   initial = c(error = 0, sum = 0)
 #' )
 #'
-#' # By hand: the memory goes from one call to the next.
+#' # Without rollout(), pass the memory from one call to the next.
 #' first <- act(pid, c(0, 0, 0.02, 0))
 #' act(pid, c(0, 0, 0.01, 0), first$memory)
 #' @examplesIf gym:::can_start_server()
@@ -243,7 +244,7 @@ abort_memory <- function(value, must, call) {
 # While it plays ---------------------------------------------------------------------------
 
 #' Give each sub-environment of a batch a memory
-#' @return The policy. One with a memory gets `kept`, an environment with the `memory` of all
+#' @return The policy. A policy with a memory gets `kept`, an R environment with the `memory` of all
 #'   sub-environments.
 #' @noRd
 with_memory <- function(policy, num_envs) {
@@ -257,7 +258,7 @@ with_memory <- function(policy, num_envs) {
   }
 }
 
-# Episodes start in these sub-environments.
+# Sets the memory of sub-environments in which an episode starts.
 begin_memory <- function(policy, sub_env) {
   if (inherits(policy, "gym_policy_list")) {
     lapply(unclass(policy), begin_memory, sub_env)
@@ -288,7 +289,7 @@ act_batch.gym_policy_memory <- function(policy, observation, n, vector_env) {
   batch_actions(said$action, n, vector_env)
 }
 
-# How to reach a number of the memory.
+# A hint on how to read a number from the memory.
 memory_form <- function(initial) {
   name <- colnames(initial)[1L]
   if (is.data.frame(initial)) {

@@ -1,12 +1,12 @@
 #' Differentiate a network by hand
 #'
 #' Use these functions to write an agent that follows a gradient. They compute how likely a policy's
-#' actions were, and how that changes with the weights, by matrix algebra and without automatic
-#' differentiation.
+#' actions were, and how this likelihood changes with the weights. They use matrix algebra and no
+#' automatic differentiation.
 #'
 #' `policy_log_prob()` and `policy_log_prob_gradient()` are for a [policy_network()] with the output
-#' `"softmax"`, whose actions have probabilities, or `"gaussian"`, whose actions have densities.
-#' These are the densities of the drawn numbers, before they are cut at the bounds of the action.
+#' `"softmax"`, whose actions have probabilities, or `"gaussian"`, whose actions have densities. A
+#' density is that of the numbers as drawn, before they are cut at the bounds of the action space.
 #'
 #' `policy_output_gradient()` is for any network, such as a value network:
 #' `policy_network(c(4, 64, 1), c("tanh", "identity"))` has one output. `predict(type = "output")`
@@ -14,9 +14,9 @@
 #'
 #' @param policy A network.
 #' @param observation Observations, as for [act()]: a matrix with one in each row, or a single one.
-#' @param action An action for each observation. For a Discrete action space a vector of whole
-#'   numbers (from 0 if the policy has not been played); for a Box a matrix with an action in each
-#'   row.
+#' @param action An action for each observation. For a Discrete action space, a vector of whole
+#'   numbers, which start at 0 if the policy has not been played. For a Box, a matrix with an action
+#'   in each row.
 #' @param weights The weight of each observation, a numeric vector, or one number for all. For
 #'   `policy_output_gradient()` and a network with several outputs, a matrix with a row for each
 #'   observation and a column for each output. The default is 1.
@@ -41,7 +41,7 @@
 #' actions <- act(policy, observations)
 #' policy_log_prob(policy, observations, actions)
 #'
-#' # A step that makes these actions more likely.
+#' # Change the weights so that these actions become more likely.
 #' gradient <- policy_log_prob_gradient(policy, observations, actions)
 #' coef(policy) <- coef(policy) + 0.1 * gradient
 #' policy_log_prob(policy, observations, actions)
@@ -78,7 +78,7 @@ policy_output_gradient <- function(policy, observation, weights = 1) {
 # The formulas --------------------------------------------------------------------------------
 
 #' Compute a network's outputs and the log-probabilities of actions
-#' @param weights The policy's weights, which other weights may follow.
+#' @param weights The policy's weights. Other weights may follow them.
 #' @param action The actions, numbered from 1; for a Gaussian, a matrix with one in each column.
 #' @return As [forward_network()], with `draws`: a list of `log_prob` and `entropy`, vectors, and
 #'   the parts of their derivatives.
@@ -145,7 +145,7 @@ seen_columns <- function(policy, observation, call = rlang::caller_env()) {
   t(network_inputs(policy, rows$values, call))
 }
 
-# Checks actions, and returns them in the form for forward_draws().
+# Checks actions and returns them in the form that forward_draws() takes.
 counted_actions <- function(policy, action, n, call = rlang::caller_env()) {
   action <- plain_numbers(action, "action", call)
   outputs <- policy$sizes[[length(policy$sizes)]]
@@ -159,13 +159,14 @@ counted_actions <- function(policy, action, n, call = rlang::caller_env()) {
     if (!is.null(policy$action_space)) {
       action <- action_by_name(policy$action_space, action, policy$env_id, call)
     }
-    # The numbers of an action with several dimensions are taken row by row.
+    # If an action has several dimensions, take its numbers row by row.
     return(matrix(row_major(action), outputs))
   }
   counted_from_one(action, policy$action_space$start %||% 0L, outputs, "action", call)
 }
 
-# Converts actions from 1 to places in a matrix with so many outputs in each column.
+# Converts actions, numbered from 1, to places in a matrix with a row for each output and a column
+# for each observation.
 places_of_actions <- function(outputs, action) (seq_along(action) - 1L) * outputs + action
 
 check_row_weights <- function(weights, n, outputs, call = rlang::caller_env()) {
@@ -200,16 +201,16 @@ check_draws_known <- function(policy, call = rlang::caller_env()) {
 
 # Layers ---------------------------------------------------------------------------------
 
-# The layers of a network for manual gradients: forwards, keeping the output of each layer, and
-# backwards from the derivatives of the outputs to those of the weights. Here each observation is a
-# column: a minibatch is then a contiguous piece of memory, and R's recycling adds a bias to each
+# Gradients of a network: forward_network() keeps the output of each layer, and backward_network()
+# goes from the derivatives of the outputs to those of the weights. Here each observation is a
+# column. A minibatch is then a contiguous piece of memory, and R's recycling adds the bias to each
 # column. In network_outputs(), as for users, each observation is a row.
 
 #' Split a vector of weights into layers
 #' @param policy A network, for its sizes and activations.
-#' @param weights Weights in the order of `coef()`, by default its own. Others may come before and
-#'   after them.
-#' @param start The number of weights before them.
+#' @param weights Weights in the order of `coef()`, by default the policy's own. Other numbers may
+#'   come before and after them.
+#' @param start How many numbers come before the weights.
 #' @return A list with a list for each layer: `weights`, a matrix with a row for each neuron, `bias`
 #'   (`NULL` for none), `activation`.
 #' @noRd
@@ -218,7 +219,7 @@ layers_of <- function(policy, weights = weight_vector(policy), start = 0L) {
   bias <- isTRUE(policy$bias)
   layers <- vector("list", length(sizes) - 1L)
   end <- start
-  # A loop, because this runs for each minibatch.
+  # A loop is fast, and this runs for each minibatch.
   for (i in seq_along(layers)) {
     neurons <- sizes[[i + 1L]]
     count <- neurons * sizes[[i]]
@@ -237,8 +238,8 @@ layers_of <- function(policy, weights = weight_vector(policy), start = 0L) {
 #' Compute the output of each layer
 #' @param layers As returned by layers_of().
 #' @param inputs A matrix with an observation in each column, prepared by network_inputs().
-#' @return A list: `outputs`, a matrix with a column for each observation; for backward_network()
-#'   the `layers` and the `signals`, which are the inputs and then the outputs of each layer.
+#' @return A list: `outputs`, a matrix with a column for each observation; and for
+#'   backward_network() the `layers`, and the `signals`: the inputs, then the outputs of each layer.
 #' @noRd
 forward_network <- function(layers, inputs) {
   signals <- vector("list", length(layers) + 1L)
@@ -246,8 +247,8 @@ forward_network <- function(layers, inputs) {
   for (i in seq_along(layers)) {
     activation <- layers[[i]]$activation
     signals[[i + 1L]] <- switch(activation,
-      # Twice as fast as tanh(), which takes a third of an update, with an error of at most 4e-16. R
-      # computes it in the memory of the sums, as they have no name.
+      # This formula of tanh() has an error of at most 4e-16 and is twice as fast; tanh() takes a
+      # third of an update. The sums have no name, so R reuses their memory.
       tanh = 1 - 2 / (exp(2 * layer_sums(layers[[i]], signals[[i]])) + 1),
       ReLU = quick_relu(layer_sums(layers[[i]], signals[[i]])),
       activate(layer_sums(layers[[i]], signals[[i]]), activation)
@@ -260,8 +261,8 @@ layer_sums <- function(layer, inputs) {
   if (is.null(layer$bias)) layer$weights %*% inputs else layer$weights %*% inputs + layer$bias
 }
 
-# Six times as fast as looking for negative numbers, which took a third of an update, with the same
-# result for finite numbers.
+# ReLU without a comparison, which is six times as fast. With comparisons it took a third of an
+# update. The result is the same for finite numbers.
 quick_relu <- function(x) (x + abs(x)) * 0.5
 
 #' Compute the derivatives of the weights
@@ -275,8 +276,8 @@ backward_network <- function(forward, slopes) {
   # The weights and the bias of each layer, in turn.
   gradient <- vector("list", 2L * length(layers))
   ones <- rep(1, ncol(slopes))
-  # R's own BLAS, which most users have, multiplies by a transposed matrix in twice the time that it
-  # takes to transpose the matrix and multiply. Faster libraries do it in the same time.
+  # With R's own BLAS, which most users have, it is twice as fast to transpose a matrix first as to
+  # use crossprod(). With faster libraries there is no difference.
   slow <- has_reference_blas()
   for (i in rev(seq_along(layers))) {
     activation <- layers[[i]]$activation
@@ -337,7 +338,7 @@ activation_slope <- function(y, activation) {
     tanh = 1 - y * y,
     logistic = y * (1 - y),
     identity = 1,
-    # Far below the middle the output is 0, which has no logarithm.
+    # For a very negative input the output is 0, which has no logarithm.
     Gompertz = -y * log(pmax(y, .Machine$double.xmin)),
     ReLU = y > 0,
     leakyReLU = ifelse(y > 0, 1, 0.01)
@@ -349,8 +350,9 @@ unit_outputs <- function(outputs, activation) {
   if (activation == "tanh") (outputs + 1) / 2 else outputs
 }
 
-# Does a single output select the second of two actions? It does above the middle of its range, or
-# above 0 if it is unbounded. Exactly the middle selects the first, as round(0.5) is 0.
+# Does a single output select the second of two actions? It does if it is above the middle of its
+# range, or above 0 if it is unbounded. The middle itself selects the first action, because
+# round(0.5) is 0.
 above_half <- function(output, activation) {
   switch(activation,
     logistic = , Gompertz = output > 0.5,

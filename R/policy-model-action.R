@@ -7,14 +7,14 @@ model_actions <- function(policy, columns, call) {
   predicted <- model_predictions(policy, columns, call)
   discrete <- inherits(space, "gym_space_discrete")
   if (discrete && inherits(policy$model, "nnet") && NCOL(predicted) == space$n && space$n > 1) {
-    # Several columns of nnet() are outputs to compare.
+    # nnet() with several outputs gives a column for each action.
     if (anyNA(predicted)) {
       abort_no_action(policy, NA, call)
     }
     labels <- colnames(predicted) %||% (space$start + seq_len(space$n) - 1L)
     predicted <- labels[max.col(predicted, ties.method = "first")]
   }
-  # The columns of a model have names from the table of steps, or of its formula.
+  # The names of the columns come from the table of steps or from the model's formula.
   predicted <- action_by_name(space, predicted, NULL, call)
   check_predictions(policy, predicted, n, if (discrete) 1L else prod(space$shape), call)
   values <- if (is.factor(predicted)) as.character(predicted) else predicted
@@ -59,7 +59,7 @@ chosen_actions <- function(policy, values) {
   if (!is.character(values)) {
     return(nearest_actions(space, as.numeric(values)))
   }
-  # The actions' numbers, or their names in the documentation.
+  # Labels are the actions' numbers, or their names in the documentation.
   numbers <- as.integer(space$start + seq_len(space$n) - 1L)
   found <- match(values, as.character(numbers))
   found <- ifelse(is.na(found), match(values, action_meaning(policy$env_id, space$n)), found)

@@ -1,9 +1,9 @@
 #' Make a policy from a fitted model
 #'
-#' The model's prediction becomes the action. You can learn a policy from the steps of another one:
-#' fit a model of the action, given the parts of the observation, and play it. Models of [lm()],
-#' [glm()], `rpart::rpart()` and `nnet::nnet()` are known. For any other model, `predict` says how
-#' it predicts.
+#' Make a policy whose action is a model's prediction. So you can imitate another policy: fit a
+#' model of its actions, given the parts of the observation, and play the model. `as_policy()` knows
+#' models of [lm()], [glm()], `rpart::rpart()` and `nnet::nnet()`. For any other model, `predict`
+#' says how it predicts.
 #'
 #' # Observations
 #'
@@ -19,21 +19,23 @@
 #'   Gymnasium's documentation, such as `"push left"`. The codes of a factor are ignored.
 #' - `TRUE` is action 1, `FALSE` action 0.
 #' - A whole number is the action itself. Any other number selects the nearest action, or the lower
-#'   one of two. So a probability above one half selects action 1.
+#'   one if two are equally near. So a probability above one half selects action 1.
 #' - A binomial [glm()] of a factor selects the second level if its probability is above one half.
 #' - [nnet::nnet()] with several outputs selects the action with the largest output, or the first of
 #'   equal ones.
 #'
-#' If actions are a Box, predictions are the actions: a numeric vector or, for actions of several
-#' numbers, a matrix with an action in each row, as from [lm()] of `cbind(action_1, action_2)`.
+#' If the action space is a Box, predictions are the actions: a numeric vector, or a matrix with an
+#' action in each row if an action has several numbers, as from [lm()] of `cbind(action_1,
+#' action_2)`.
 #'
 #' # Models of Stable-Baselines3
 #'
-#' `as_policy("model.zip")` reads a zip file that `model.save()` of Stable-Baselines3 made, such as
-#' those of its zoo. It makes a [policy_network()] of it, or for a convolutional or recurrent policy
-#' one that Stable-Baselines3 plays, see [learn_sb3()]. It needs the server's extra `"sb3"`. Such
-#' a file has weights, settings in plain text, and pickles. A pickle from elsewhere can run any
-#' program with your rights, so none is loaded. What only a pickle says is an argument.
+#' `as_policy("model.zip")` reads a zip file that `model.save()` of Stable-Baselines3 wrote, such as
+#' those of rl-baselines3-zoo. The result is a [policy_network()]. A convolutional or recurrent
+#' policy stays with Stable-Baselines3, which plays it, see [learn_sb3()]. Reading the file needs
+#' the server's extra `"sb3"`. The file has weights, settings in plain text, and pickles. A pickle
+#' from elsewhere can run any program with your rights, so `as_policy()` loads no pickle. If only a
+#' pickle has a setting, give it as the argument `activation` or `moments`.
 #'
 #' @param x A fitted model, or the path of a zip file of Stable-Baselines3. Policies and functions
 #'   of observations are returned unchanged. A training, a search or a rollout returns its policy.
@@ -44,28 +46,29 @@
 #' @param predict `NULL` for a known model, or a function of the model and a data frame of
 #'   observations that returns their actions in one of the forms below, such as
 #'   `function(model, newdata) predict(model, newdata)$predictions`.
-#' @return A policy; for a model one of class `gym_policy_model`, a list with the elements `model`,
-#'   `predict`, `arguments` (a list: those of `predict()`), `labels` (the two levels of a binomial
-#'   [glm()]'s factor, otherwise `NULL`), `package` (the package of its method, a string or `NULL`),
-#'   `observation_space`, `action_space` and `env_id` (`NULL` until it is played).
-#' @section Errors: `gym_error_argument` for an unknown model without `predict`, or, while it is
-#'   played, if `predict()` fails or its result is not an action.
-#' @section Warnings: `gym_warning_response`, once a session for each formula, if a model was
-#'   fitted to numbers that are no actions, such as the codes of a factor, or is a regression on
-#'   more than two actions.
+#' @return A policy. A policy made of a model has the class `gym_policy_model` and is a list with
+#'   the elements `model`, `predict`, `arguments` (a list: those of `predict()`), `labels` (the two
+#'   levels of a binomial [glm()]'s factor, otherwise `NULL`), `package` (the package of its method,
+#'   a string or `NULL`), `observation_space`, `action_space` and `env_id` (`NULL` until it is
+#'   played).
+#' @section Errors: `gym_error_argument` for an unknown model without `predict`. Playing raises it
+#'   if `predict()` fails or its result is not an action.
+#' @section Warnings: `gym_warning_response` if a model was fitted to numbers that are not actions,
+#'   such as the codes of a factor, or if it is a regression on the numbers of more than two
+#'   actions. The warning comes once a session for each formula.
 #' @export
 #' @examples
-#' # A model that was fitted to made-up data.
+#' # Fit a model to made-up data.
 #' steps <- data.frame(pole_angle = rnorm(100))
 #' steps$action <- as.integer(steps$pole_angle + rnorm(100, sd = 0.5) > 0)
 #' as_policy(glm(action ~ pole_angle, binomial, steps))
 #'
-#' # A model of another kind.
+#' # For another kind of model, say how it predicts.
 #' fit <- loess(action ~ pole_angle, steps)
 #' as_policy(fit, predict = function(model, newdata) predict(model, newdata) > 0.5)
 #'
 #' @examplesIf gym:::can_start_server()
-#' # Learn from a policy that is good, without knowing how it decides.
+#' # Imitate a good policy.
 #' good <- search_random("CartPole-v0", seed = 1)$policy
 #' played <- rollout("CartPole-v1", good, episodes = 5, seed = 1, steps = TRUE)
 #' fit <- glm(action ~ pole_angle + pole_angular_velocity, binomial, as.data.frame(played))
@@ -128,8 +131,8 @@ as_policy.gym_rollout <- as_policy.gym_training
 
 #' Find out how a model of a known class predicts actions
 #' @param type The user's `type` of predictions, `NULL` for the default.
-#' @return A list: `type`; `package`, which has the method of predict(); `labels`, the two levels
-#'   that a probability distinguishes, if it does. `NULL` for an unknown model.
+#' @return A list: `type`; `package`, which has the method of predict(); `labels`, the two levels of
+#'   a binomial model's factor, if there are any. `NULL` for an unknown model.
 #' @noRd
 model_defaults <- function(model, type, call) {
   if (inherits(model, "glm")) {
@@ -156,7 +159,7 @@ model_defaults <- function(model, type, call) {
 #' @export
 format.gym_policy_model <- function(x, ...) {
   formula <- tryCatch(stats::formula(x$model), error = function(cnd) NULL)
-  # Without its environment, which would be printed, too.
+  # Remove the formula's environment, which would be printed, too.
   text <- if (inherits(formula, "formula")) describe_value(`attributes<-`(formula, NULL))
   paste(c(paste(class(x$model)[[1L]], "model"), text), collapse = ", ")
 }
@@ -179,7 +182,7 @@ policy_bind.gym_policy_model <- function(policy, env, call = rlang::caller_env()
   policy
 }
 
-# A policy that was read from a file does not load the package.
+# Reading a policy from a file does not load the model's package.
 load_model_package <- function(policy, call) {
   package <- policy$package
   if (!is.null(package) && !isNamespaceLoaded(package)) {
@@ -220,7 +223,8 @@ observed_action <- function(policy, observed, call) {
 
 #' Put observations given by hand into the columns of a table
 #'
-#' A model with a formula finds its columns in a data frame itself.
+#' A model with a formula finds its columns in a data frame by name, so a data frame is returned as
+#' it is.
 #' @return A list: `columns`, and `one`, whether it is a single observation.
 #' @noRd
 model_columns <- function(policy, observation, arg, call) {
@@ -246,7 +250,7 @@ check_was_played <- function(policy, call) {
   abort_if(
     is.null(policy$action_space), "policy", policy, call,
     "The model does not know the observations and actions of an environment.",
-    i = "Play it with `rollout()`: the policy in what that returns knows the environment."
+    i = "Play it with `rollout()`: the element `policy` of the result knows the environment."
   )
 }
 

@@ -2,7 +2,8 @@
 
 network_action <- function(space, outputs, policy, one) {
   if (is_gaussian(policy)) {
-    # They are cut at the bounds when the step is taken. Candidates have a row of deviations each.
+    # The step cuts these numbers at the bounds. With candidates, each has its own row of
+    # deviations.
     deviation <- exp(policy$log_std)
     if (is.null(dim(deviation))) deviation <- rep(deviation, each = nrow(outputs))
     values <- outputs + deviation * stats::rnorm(length(outputs))
@@ -26,7 +27,7 @@ discrete_action <- function(space, outputs, policy) {
     integer(nrow(outputs))
   }
   if (identical(policy$output, "epsilon-greedy")) {
-    # As for greedy actions: a single output chooses between two.
+    # A single output chooses between two actions, as in greedy networks.
     chosen <- explore(chosen, policy$epsilon, space$n %||% max(ncol(outputs), 2L))
   }
   if (is.null(space)) chosen else chosen + as.integer(space$start)
@@ -56,7 +57,7 @@ box_action <- function(space, outputs, policy, one) {
   } else {
     outputs
   }
-  # Rounding must not move a value past a bound: the environment would refuse it.
+  # Rounding may move a value past a bound, and the environment would refuse it.
   values <- pmin(pmax(values, low), high)
   if (space$dtype %in% integer_dtypes) {
     values <- round(values)
@@ -75,7 +76,7 @@ greedy_policy <- function(policy) {
     return(policy)
   }
   if (is_gaussian(policy) && is.null(policy$action_space)) {
-    # Its bounds are unknown; only its actions are known to be numbers.
+    # The bounds are unknown, but a gaussian policy's actions are always numbers.
     outputs <- policy$sizes[[length(policy$sizes)]]
     policy$action_space <- space_box(rep(-Inf, outputs), rep(Inf, outputs))
   }
@@ -83,8 +84,8 @@ greedy_policy <- function(policy) {
   policy
 }
 
-# Numbers drawn without bounds are cut at those of the action space in the step. A list of policies
-# may contain one that draws so; actions of this package's other policies are within the bounds.
+# Must the step cut actions at the bounds? Gaussian networks draw numbers without bounds; actions of
+# this package's other policies are within the bounds.
 clips_actions <- function(policy) UseMethod("clips_actions")
 
 #' @exportS3Method

@@ -1,5 +1,5 @@
-# Binding a network to an environment: it needs as many inputs as an observation has numbers, and as
-# many outputs as there are actions or numbers of an action.
+# Binding a network to an environment. The network needs an input for each number of an observation,
+# and an output for each action, or for each number of an action.
 
 #' @exportS3Method
 policy_bind.gym_policy_network <- function(policy, env, call = rlang::caller_env()) {
@@ -129,8 +129,8 @@ abort_fit <- function(policy, problem, env, call) {
   )
 }
 
-# The number of outputs for actions of this space: a single one chooses between two, unless each
-# action has its own probability or value.
+# The number of outputs for an action space. For two actions a greedy network needs only one output.
+# Other networks need an output for each action, because each has a probability or a value.
 outputs_for <- function(space, output = "greedy") {
   width <- space_width(space)
   if (output == "greedy" && inherits(space, "gym_space_discrete") && width == 2) 1L else width

@@ -1,12 +1,14 @@
 #' Act by a small neural network
 #'
-#' Make a network and draw its weights, uniformly between -1 and 1, from R's generator. Each layer
-#' multiplies its input by its weights and applies its activation.
+#' Make a policy from a small neural network. Each layer multiplies its input by its weights and
+#' applies its activation. The weights are drawn by R's generator, by default uniformly between -1
+#' and 1.
 #'
 #' # From outputs to an action
 #'
-#' The meaning of the outputs depends on the environment's action space. The policy gets it from
-#' [rollout()], [search_random()] or [policy_bind()]; before that it assumes the actions 0, 1, ...
+#' The meaning of the outputs depends on the environment's action space. [rollout()],
+#' [search_random()] and [policy_bind()] tell the policy this space. Until then it assumes the
+#' actions 0, 1, ...
 #'
 #' - One output and two actions: the output, scaled to the range from 0 to 1, is rounded, as in the
 #'   tutorial *Artificial Intelligence in R (I)* (2018). Exactly one half selects the first action,
@@ -27,34 +29,34 @@
 #' actions. Their last activation is `"identity"`:
 #'
 #' - `output = "softmax"` draws an action of a Discrete space with a probability proportional to
-#'   `exp(output)`. There is an output for each action.
+#'   `exp(output)`. The network has an output for each action.
 #' - `output = "gaussian"` draws the numbers of a Box, each from a normal distribution around its
 #'   output. The standard deviations do not depend on the observation. Their logarithms, `log_std`,
 #'   are weights, the last ones of [coef()][coef.gym_policy_network]. The step cuts the numbers at
-#'   the bounds of the Box, but the steps of a [rollout()] keep them as drawn: [policy_log_prob()]
-#'   is about these.
+#'   the bounds of the Box, but the steps of a [rollout()] keep the numbers as drawn, because
+#'   [policy_log_prob()] needs these.
 #' - `output = "epsilon-greedy"` draws any action with the probability `epsilon`, and otherwise
 #'   takes the one with the largest output.
 #'
 #' # Observations
 #'
-#' A Box has as many inputs as numbers (an array row by row, as Gymnasium flattens it). A Discrete
-#' observation, such as the field of a board, has one input for each of its values: 1 for the
-#' observed one, 0 for the others.
+#' For a Box, the network has an input for each number of an observation (an array is flattened row
+#' by row, as by Gymnasium). For a Discrete observation, such as the field of a board, it has an
+#' input for each possible value: 1 for the observed value, 0 for the others.
 #'
-#' With `normalize = TRUE` the mean of each number of a Box is subtracted and the result divided by
-#' its standard deviation, so that numbers of different size have the same influence. These moments
-#' are those of the observations in training and belong to the policy. A search updates them;
-#' playing and evaluating do not. Before the first update, observations are used as they are. A
-#' number that has never changed becomes 0. The result is clipped to the range from `-clip_obs` to
-#' `clip_obs`, as in
+#' With `normalize = TRUE` the policy subtracts the mean of each number of a Box and divides by its
+#' standard deviation, so that large and small numbers have the same influence. The policy keeps
+#' these moments, which are those of the observations in training. A search updates them; playing
+#' and evaluating do not. Before the first update, observations are used as they are. A number that
+#' has never changed becomes 0. The result is clipped to the range from `-clip_obs` to `clip_obs`,
+#' as in
 #' [Stable-Baselines3](https://stable-baselines3.readthedocs.io/en/master/guide/vec_envs.html).
 #'
 #' @param sizes The numbers of inputs, of neurons in each hidden layer, and of outputs: whole
-#'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial: 4 x
-#'   2 + 2 x 1 = 10 weights. The first and the last may be `NA`. The environment then determines
-#'   them, with a single output for two actions. Weights that are not given are then drawn when it
-#'   is first played, from a seed that is drawn now.
+#'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial: 4 x 2
+#'   + 2 x 1 = 10 weights. The first and the last may be `NA`. The environment then determines them;
+#'   for two actions there is a single output. In this case the weights are drawn when the policy is
+#'   first played, from a seed that is drawn now.
 #' @param activation The names of the activations: one for the hidden layers and one for the outputs
 #'   (the default, `c("tanh", "logistic")`, as in the tutorial), or one for each layer after the
 #'   inputs: `"tanh"`, `"logistic"`, `"identity"` (no change), `"Gompertz"`, `"ReLU"` or
@@ -64,7 +66,8 @@
 #'   the last column is the bias. `NULL`, the default, draws them.
 #' @param bias Does each neuron have a bias, a number added to its sum? `FALSE`, the default, or
 #'   `TRUE`.
-#' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`, see [policy_network()].
+#' @param normalize Normalise observations? `FALSE`, the default, or `TRUE`; see the section
+#'   *Observations* of [policy_network()].
 #' @param clip_obs Where to clip normalised observations, a number above 0 or `Inf`. The default
 #'   is 10.
 #' @param output How the outputs determine an action, a string: `"greedy"`, the default,
@@ -76,7 +79,7 @@
 #'   The default is 0.1.
 #' @param init How to draw the first weights, a string. `"uniform"`, the default, draws them between
 #'   -1 and 1. `"orthogonal"` makes layers whose rows (or columns, if these are fewer) are
-#'   orthogonal. Their length is sqrt(2), and for the outputs 1, or 0.01 if actions are drawn by
+#'   orthogonal. Their length is sqrt(2). For the outputs it is 1, or 0.01 if actions are drawn by
 #'   their probability. Biases are 0 (Saxe, McClelland and Ganguli 2014; Andrychowicz et al. 2021).
 #' @return A policy of class `gym_policy_network`, for [act()], [rollout()] and [search_random()].
 #'   It is a list with the elements `sizes` (integers), `activation` (strings, one for each layer),
@@ -84,9 +87,9 @@
 #'   `mean`, `squares` and `scale`, of the observations), `clip_obs` (a number), `output` and `init`
 #'   (strings), `log_std` (numbers, which only `"gaussian"` uses), `epsilon` (a number),
 #'   `observation_space`, `action_space` (spaces) and `env_id` (the id of the environment, a
-#'   string), all three `NULL` until it is played.
+#'   string), all three `NULL` until the policy is played.
 #' @section Errors: `gym_error_argument` if sizes, activations and weights do not fit each other,
-#'   or, from [act()], if the observation does not have as many numbers as there are inputs.
+#'   and from [act()] if an observation does not have a number for each input.
 #' @references The network and the way its weights are drawn are those of the tutorial,
 #'   whose code computes the activations with the package sigmoid.
 #'
@@ -105,7 +108,7 @@
 #' policy$weights
 #' act(policy, c(0.01, -0.2, 0.03, 0.4))
 #'
-#' # The weights may be given, and need not be random: this one follows the pole.
+#' # You can also give the weights. This network follows the pole.
 #' follow <- policy_network(c(4, 1), weights = list(matrix(c(0, 0, 1, 1), nrow = 1)))
 #' act(follow, rbind(c(0, 0, 0.1, 0), c(0, 0, -0.1, 0)))
 policy_network <- function(sizes = c(4, 2, 1), activation = NULL, weights = NULL, bias = FALSE,
@@ -218,14 +221,14 @@ act.gym_policy_network <- function(policy, observation, draw = TRUE, ...) {
   rows_action(policy, network_rows(policy, observation, "observation", call), draw, call)
 }
 
-# Observations given by hand, as observation_rows() returns them, and the actions for them.
+# Reads observations that a user gave, as observation_rows() does, and computes their actions.
 network_rows <- function(policy, observation, arg, call) {
   observation_rows(observation, policy$observation_space, policy$sizes[[1L]], arg, call)
 }
 
 rows_action <- function(policy, rows, draw, call) {
-  # Without a Box its outputs choose one of several actions. Those of "logistic", the default, are
-  # for that; others may be meant as the numbers of a Box.
+  # Without an environment, the outputs choose one of several actions. Outputs of "logistic", the
+  # default, are made for that. The user may mean other outputs as the numbers of a Box, so say it.
   if (is.null(policy$action_space) && policy$output %in% c("greedy", NA) &&
         output_activation(policy) != "logistic") {
     last <- max(policy$sizes[[length(policy$sizes)]], 2L) - 1L
@@ -246,8 +249,8 @@ act_batch.gym_policy_network <- function(policy, observation, n, vector_env) {
   network_action(policy$action_space, outputs, policy, one = FALSE)
 }
 
-# Takes the numbers of an observation with several dimensions in R's order, column after column, and
-# reorders the input weights once to match.
+# R keeps an observation with several dimensions column after column. Reordering the input weights
+# once saves reordering every observation.
 #' @exportS3Method
 policy_rows.gym_policy_network <- function(policy, candidate, sub_env) {
   shape <- policy$observation_space$shape
@@ -272,7 +275,7 @@ act_batch.gym_policy_by_column <- function(policy, observation, n, vector_env) {
 #' @noRd
 network_outputs <- function(policy, values, call = rlang::caller_env()) {
   signal <- network_inputs(policy, values, call)
-  # Some activations make a vector of a matrix without rows.
+  # Some activations turn a matrix without rows into a vector.
   if (!nrow(signal)) {
     return(matrix(0, 0L, policy$sizes[[length(policy$sizes)]]))
   }
@@ -283,7 +286,7 @@ network_outputs <- function(policy, values, call = rlang::caller_env()) {
   signal
 }
 
-# The input of a layer: with a bias, the constant 1 is added.
+# The input of a layer. With a bias, the constant 1 is one more input.
 with_bias <- function(signal, policy) if (isTRUE(policy$bias)) cbind(signal, 1) else signal
 
 network_inputs <- function(policy, values, call = rlang::caller_env()) {
@@ -309,7 +312,7 @@ network_inputs <- function(policy, values, call = rlang::caller_env()) {
   inputs
 }
 
-# The numbers of `n` values, from 1 instead of `start`.
+# Numbers values from 1 that the space numbers from `start`.
 counted_from_one <- function(values, start, n, arg, call) {
   at <- if (is.numeric(values)) values - start + 1 else NA
   if (anyNA(at) || any(at < 1 | at > n | at != trunc(at))) {
@@ -321,10 +324,10 @@ counted_from_one <- function(values, start, n, arg, call) {
 
 # Drawing again, and printing ------------------------------------------------------
 
-# Draws its weights again.
+# Draws a network's weights again.
 policy_resample <- function(policy) {
   if (anyNA(policy$sizes)) {
-    # The weights depend on this number and are drawn when the sizes are known.
+    # The weights are drawn from this seed once the sizes are known.
     policy$weights_seed <- draw_seed()
   } else {
     policy$weights <- draw_first_weights(policy)

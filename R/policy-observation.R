@@ -1,5 +1,5 @@
-# Observations given to a policy by hand, one or many: by name where names are known, otherwise by
-# position. Observations in play have the order of the space and do not come here.
+# Reads observations that a user gives to a policy, one or many: by name where names are known,
+# otherwise by position. Observations in play have the order of the space and do not need this.
 
 #' Put one or many observations into the rows of a matrix
 #'
@@ -74,8 +74,8 @@ observed_batch <- function(observation, space, arg = "observation", call = rlang
 
 # By name ------------------------------------------------------------------------------
 
-# The numbers of observations in the order of the space. Names that mean nothing to the space, where
-# its own are unknown, are labels.
+# The numbers of observations in the order of the space. If the space has no names of its own, the
+# user's names are only labels.
 numbers_by_name <- function(observation, space, n, arg, call) {
   rank <- if (is.null(space)) 1L else length(space$shape)
   given <- if (is.data.frame(observation)) {
@@ -98,8 +98,8 @@ numbers_by_name <- function(observation, space, n, arg, call) {
   if (is.null(dim(observation))) observation[at] else observation[, at, drop = FALSE]
 }
 
-# The parts of observations, a list in the order of the space with its names. One value of a Dict is
-# returned as it is, because check_value() compares its keys.
+# The parts of observations: a list with the names and the order of the space. A single value of a
+# Dict is returned as it is, because check_value() compares its keys.
 parts_by_name <- function(observation, space, arg, call) {
   keys <- names(space$spaces)
   if (!is.list(observation) || !is.null(keys) && !is.data.frame(observation)) {
@@ -122,7 +122,8 @@ parts_by_name <- function(observation, space, arg, call) {
 #' Find the places of known names among given ones
 #'
 #' @param known The names in the table of steps.
-#' @param own The names of the space, which stand for those of the table; `NULL` for none.
+#' @param own The names of the space, which the user may give instead of those of the table; `NULL`
+#'   for none.
 #' @param open Whether there may be further names, as in a data frame.
 #' @noRd
 places_by_name <- function(given, known, own, open, arg, call) {

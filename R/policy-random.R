@@ -1,10 +1,10 @@
 #' Act at random
 #'
-#' `policy_random()` makes a policy that ignores the observation and draws its action: uniformly
-#' between the bounds of the action space, and from an exponential or normal distribution if one
-#' side or both are unbounded, like Gymnasium's own `sample()`. In a model, see [gym_model()], it
+#' Make a policy that ignores the observation and draws its action from the action space, like
+#' Gymnasium's own `sample()`: uniformly between the bounds, from an exponential distribution if one
+#' side is unbounded, and from a normal distribution if both are. In a model (see [gym_model()]) it
 #' draws among the actions that the state has. It uses R's generator, so [set.seed()] fixes its
-#' actions. `random_discrete_agent()` does the same for `n` actions; it has the name from the
+#' actions. `random_discrete_agent()` makes such a policy for `n` actions; the name is that of the
 #' classic package.
 #'
 #' @param action_space The space to draw from, such as `gym_make("CartPole-v1")$action_space`.
@@ -52,9 +52,8 @@ act.gym_policy_random <- function(policy, observation, ...) {
   if (is.null(n)) space_sample(space) else sample_batch(space, n)
 }
 
-# The number of observations, each of which gets an action. It is known only for numbers and for
-# rows of a data frame. Lists, of an environment with several parts, are given one at a time. `NULL`
-# is a single observation.
+# The number of observations; each gets an action. Numbers and the rows of a data frame can be
+# counted. A list is one observation of several parts, and so is `NULL`.
 count_observed <- function(observation, space) {
   if (!is.null(space) && !is_stackable(space) || is.list(observation)) {
     return(if (is.data.frame(observation)) nrow(observation))
@@ -79,12 +78,13 @@ policy_bind.gym_policy_random <- function(policy, env, call = rlang::caller_env(
   policy$observation_space <- env$observation_space
   if (is.null(own)) {
     policy$action_space <- env$action_space
-    # A terminal state has no actions; the policy does nothing there.
+    # A terminal state has no actions, so the policy does nothing there.
     count <- if (!is.null(env$possible)) rowSums(env$possible)
     policy$possible <- if (any(count > 0 & count < ncol(env$possible))) env$possible
     return(policy)
   }
-  # Each of its actions must be one of the environment's, by their kinds and shapes.
+  # Each action of the policy must be an action of the environment: compare the spaces' kinds and
+  # shapes.
   all <- env$action_space
   within <- if (inherits(own, "gym_space_discrete") && inherits(all, "gym_space_discrete")) {
     own$start >= all$start && own$start + own$n <= all$start + all$n

@@ -1,28 +1,29 @@
 #' Make a policy from a table of values
 #'
 #' Make a policy from a table with a row for each observation (a state) and a column for each
-#' action. In each state it takes the action with the largest value, or the first of equal ones.
-#' With `epsilon` it explores: with this probability it draws an action uniformly (Sutton and Barto
-#' 2018, section 2.2). With `temperature` it draws each action with a probability proportional to
-#' `exp(value / temperature)` (softmax, or Boltzmann, exploration).
+#' action. In each state the policy takes the action with the largest value, or the first of equal
+#' ones. With `epsilon` it explores: with this probability it draws an action uniformly (Sutton and
+#' Barto 2018, section 2.2). With `temperature` it draws each action with a probability proportional
+#' to `exp(value / temperature)` (softmax, or Boltzmann, exploration).
 #'
 #' Observations are Discrete, MultiDiscrete, MultiBinary, or a Tuple or Dict of these. The rows are
-#' in the order of a Discrete space's numbers. With several numbers the last one changes first.
-#' Actions are of these kinds, too: a table has a column for each combination of an action's parts,
-#' in the same order, and the actions that the policy takes have their parts.
+#' in the order of a Discrete space's numbers. If an observation has several numbers, the last one
+#' changes fastest from row to row. Action spaces are of these kinds, too. If an action has several
+#' parts, the table has a column for each combination, in the same order, and the policy returns
+#' actions with their parts.
 #'
 #' @param q A numeric matrix with a row for each state and a column for each action: values, or
-#'   other numbers of which larger is better. `-Inf` marks an invalid action. A row without a valid
-#'   action is an error if the policy gets there.
+#'   other numbers of which larger is better. `-Inf` marks an invalid action. It is an error if the
+#'   policy gets to a state without a valid action.
 #' @param epsilon The probability of exploring, a number from 0, the default, to 1.
-#' @param temperature The temperature of the softmax, a number above 0. `NULL`, the default, for
-#'   none.
+#' @param temperature The temperature of the softmax, a number above 0. `NULL`, the default, draws
+#'   no actions.
 #' @return A policy of class `gym_policy_table`, for [act()], [rollout()] and [evaluate_policy()].
 #' @section Errors: `gym_error_argument` for an invalid table, or one without the rows and columns
 #'   that the environment needs.
 #' @references R. S. Sutton and A. G. Barto (2018), Reinforcement Learning: An Introduction, second
 #'   edition, MIT Press.
-#' @seealso [solve_mdp()], which finds the best policy if the model is known
+#' @seealso [solve_mdp()], which finds the best policy if the environment has a model
 #' @export
 #' @examples
 #' # Two states, three actions.
@@ -45,7 +46,7 @@ policy_table <- function(q, epsilon = 0, temperature = NULL) {
   )
 }
 
-# Sorted as text, as by tapply(), row 10 comes before row 2.
+# Functions such as tapply() sort numbers as text, so that row 10 comes before row 2.
 check_in_order <- function(q, call = rlang::caller_env()) {
   for (axis in 1:2) {
     names <- dimnames(q)[[axis]]
@@ -66,7 +67,7 @@ act.gym_policy_table <- function(policy, observation, ...) {
   by_name <- !is.null(states_of(policy)$values) && !is.numeric(observation)
   if (by_name) observation <- encoded_values(states_of(policy), observation, "state", NULL)
   actions <- observed_actions(policy, observed_batch(observation, states_of(policy)))
-  # An observation given by name gets the name of its action.
+  # If observations were given by name, return actions by name.
   if (by_name) named_numbers(policy$action_space, actions) else actions
 }
 

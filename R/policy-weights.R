@@ -6,8 +6,8 @@ weight_shapes <- function(sizes, bias) {
   Map(c, sizes[-1L], sizes[-length(sizes)] + isTRUE(bias))
 }
 
-# Saxe, McClelland and Ganguli (2014): orthogonal rows, or columns if these are fewer, of length
-# `gain`; biases are 0.
+# Draws orthogonal rows (or columns, if these are fewer) of length `gain`, with biases of 0 (Saxe,
+# McClelland and Ganguli 2014).
 draw_orthogonal <- function(shape, gain, bias) {
   neurons <- shape[[1L]]
   inputs <- shape[[2L]] - isTRUE(bias)
@@ -23,8 +23,8 @@ draw_orthogonal <- function(shape, gain, bias) {
 draw_first_weights <- function(policy) {
   shapes <- weight_shapes(policy$sizes, policy$bias)
   if (policy$init == "orthogonal") {
-    # With small weights all actions are about equally likely at first. An output that the
-    # environment chooses later draws its actions, too.
+    # With small weights, all actions are about equally likely at first. `NA` counts as an output
+    # that draws, because the environment will choose softmax or gaussian.
     draws <- is.na(policy$output) || has_log_prob(policy)
     gain <- c(rep(sqrt(2), length(shapes) - 1L), if (draws) 0.01 else 1)
     return(Map(draw_orthogonal, shapes, gain, isTRUE(policy$bias)))
@@ -34,8 +34,8 @@ draw_first_weights <- function(policy) {
   })
 }
 
-# The user may have changed the weights. A network whose sizes depend on the environment has no
-# weights before it is bound.
+# Checks the weights, which the user may have changed. A network whose sizes depend on the
+# environment has no weights before it is bound.
 check_network <- function(policy, call = rlang::caller_env()) {
   abort_if(
     is.null(policy$weights),
@@ -97,8 +97,8 @@ sizes_text <- function(sizes) paste(ifelse(is.na(sizes), "*", sizes), collapse =
 #' Get and set the weights of a policy
 #'
 #' `coef()` returns the weights of a network as one numeric vector, and `coef(policy) <- w` sets
-#' them. Use it to apply any function of vectors to policies: averages of policies, noise around
-#' one, [stats::optim()].
+#' them. Use them to apply any function of vectors to policies: to average policies, to add noise to
+#' one, or to call [stats::optim()].
 #'
 #' The order is that in which [policy_network()] draws them: layer after layer, each matrix column
 #' after column, starting with the weights of the first input. A network with the output
@@ -170,7 +170,7 @@ coef.gym_policy <- function(object, ...) abort_no_weights(object, "object", rlan
   policy_candidates(object$policy, value)
 }
 
-# The values of a table are read from the agent that learned them, not from the policy.
+# A table has no weights. Its values are in the training that learned them.
 table_hint <- paste(
   "`decision_map(env, policy)` shows what a table does, and `state_values(training)` the values",
   "that were learned; both can be plotted."
@@ -192,9 +192,10 @@ abort_no_weights <- function(policy, arg, call) {
 #' 2018; Rajeswaran et al. 2017). The environment determines the numbers of inputs and outputs. All
 #' weights are 0 until a search finds others.
 #'
-#' The outputs determine the action as for unbounded outputs of [policy_network()]. With several
-#' actions it takes the one with the largest output. With two actions and one output it takes the
-#' second if the output is above 0. The numbers of a Box are the outputs, cut at its bounds.
+#' The outputs determine the action in the same way as unbounded outputs of [policy_network()]. With
+#' several actions, the policy takes the one with the largest output. With two actions and one
+#' output, it takes the second if the output is above 0. For a Box, the outputs are the numbers of
+#' the action, cut at its bounds.
 #'
 #' @inheritParams policy_network
 #' @param weights A matrix with one row for each output and one column for each number of an

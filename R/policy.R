@@ -1,8 +1,7 @@
 #' Choose an action
 #'
-#' Return a policy's action for an observation: one action for one observation, many actions for
-#' many observations. Nothing changes, except that a [random policy][policy_random()] draws from R's
-#' generator.
+#' Return a policy's action for an observation, or many actions for many observations. Nothing
+#' changes, except that a [random policy][policy_random()] draws from R's generator.
 #'
 #' A policy is an object made by [policy_random()] or [policy_network()], or any function that takes
 #' many observations, one in each row of a matrix, and returns as many actions. To make another kind
@@ -13,12 +12,13 @@
 #'
 #' A function always gets a batch of observations, even if there is only one. For the usual
 #' environments the batch is a matrix with an observation in each row. If observations are arrays,
-#' it is an array with an additional first dimension; if they are single whole numbers, an integer
-#' vector; if they have several parts (Tuple and Dict), a list with the same for each part. The
-#' number of observations varies: [rollout()] plays many episodes together and leaves out those that
-#' have ended. The result has the same form: a vector with an action for each observation (`TRUE`
-#' counts as 1), a matrix with an action in each row, an array, or a list of these for the parts.
-#' [rollout()] first calls the function with a single observation, so that errors show at once.
+#' the batch is an array with an additional first dimension. If they are single whole numbers, it is
+#' an integer vector. If they have several parts (Tuple and Dict), it is a list with such a batch
+#' for each part. The number of observations varies, because [rollout()] plays many episodes
+#' together and leaves out those that have ended. The result has the same form: a vector with an
+#' action for each observation (`TRUE` counts as 1), a matrix with an action in each row, an array,
+#' or a list of these for the parts. [rollout()] first calls the function with a single observation,
+#' so that errors show at once.
 #'
 #' A policy that draws its actions, such as a [policy_network()] with the output `"softmax"`, also
 #' uses R's generator. `draw = FALSE` returns its most likely action instead.
@@ -36,11 +36,10 @@
 #' @param observation The observation. For the usual environments a numeric vector is one
 #'   observation, and a numeric matrix or a data frame has one in each row. If observations are
 #'   arrays, many of them have an additional first dimension. If they are single whole numbers, many
-#'   of them are an integer vector. Where the names of an observation's numbers are known, the
-#'   names of a vector and the column names of a matrix or a data frame must be these, in any order;
-#'   further columns of a data frame, such as the steps of a [rollout()], are ignored. Without names
-#'   numbers are taken by position. A function has no observation space: it gets a vector as a
-#'   matrix of one row.
+#'   of them are an integer vector. If you give names (of a vector, or of the columns of a matrix or
+#'   a data frame) and the policy knows those of an observation's numbers, they must be the same, in
+#'   any order. Further columns of a data frame, such as in the steps of a [rollout()], are ignored.
+#'   Without names, numbers are taken by position. A function gets a vector as a matrix of one row.
 #' @param draw For a network that draws its actions: draw? `TRUE`, the default, or `FALSE` for the
 #'   most likely action, or the one with the largest value.
 #' @param ... For methods.
@@ -100,7 +99,8 @@ act.function <- function(policy, observation, ...) {
 
 is_one_vector <- function(observation) is.atomic(observation) && is.null(dim(observation))
 
-# Observations in the form for functions: a vector is one, in a matrix of one row.
+# Observations in the form for functions: a vector is one observation, so it becomes a matrix of one
+# row.
 function_rows <- function(observation) {
   if (is.data.frame(observation)) {
     frame_rows(observation)
@@ -111,7 +111,8 @@ function_rows <- function(observation) {
   }
 }
 
-# A data frame as a matrix. as.matrix() gives one without rows the type logical.
+# Converts a data frame to a numeric matrix. as.matrix() makes a logical matrix if there are no
+# rows.
 frame_rows <- function(x) {
   rows <- as.matrix(x)
   if (!nrow(rows)) storage.mode(rows) <- "double"
@@ -145,7 +146,7 @@ check_policy <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   invisible(x)
 }
 
-# A policy, or a list of policies, which become candidates.
+# Checks a policy, or a list of policies, which become candidates.
 check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   force(arg)
   check_given(x, "`policy_random()` is one, and so is a function of observations.", arg, call)
@@ -162,7 +163,7 @@ check_policies <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_e
   policy_list(x)
 }
 
-# A training plays as its policy, trainings as the policies of their seeds.
+# A training stands for its policy, and trainings for the policies of their seeds.
 trained_policy <- function(x) {
   if (inherits(x, c("gym_training", "gym_rollout"))) {
     x$policy
@@ -173,7 +174,7 @@ trained_policy <- function(x) {
   }
 }
 
-# Candidates are several policies, so they cannot be an element of a list.
+# Candidates are already several policies, so they cannot be one element of a list.
 check_one_policy <- function(x, arg, call) {
   abort_if(
     !is.null(count_candidates(x)),
@@ -182,7 +183,7 @@ check_one_policy <- function(x, arg, call) {
   )
 }
 
-# Is there a method of the generic function for the object's own class?
+# Is there a method of the generic function for a class of the object?
 has_method <- function(x, generic) {
   if (!is.object(x)) {
     return(FALSE)
@@ -204,9 +205,10 @@ policy_label <- function(policy) sub("(,| over| of ).*", "", policy_text(policy)
 
 #' Bind a policy to an environment
 #'
-#' [rollout()], [train_agent()] and every search do this first. The policy gets the observation and
-#' action spaces. A network whose sizes depend on the environment gets these and its weights. Write
-#' a method if a package has its own policy class; without one a policy stays as it is.
+#' Tell a policy the observation and action spaces of an environment. [rollout()], [train_agent()]
+#' and every search do this first. A network whose sizes depend on the environment also gets its
+#' sizes and weights. If your package has its own class of policies, write a method for it; without
+#' a method a policy stays as it is.
 #'
 #' @param policy The policy.
 #' @param env The environment, as returned by [gym_make()] or [as_vector_env()].

@@ -1,10 +1,10 @@
-# The child process that trains: a Python that has Stable-Baselines3, plain files, and the end of
-# its standard input as the sign to stop. Nothing else goes between it and R.
+# Runs a child process: a Python that has Stable-Baselines3. R and the child exchange plain files.
+# To stop the child, R closes the child's standard input.
 
 sb3_modules <- c("torch", "stable_baselines3", "sb3_contrib")
 
-# The Python of the session's server, or another one that gym_client() would take, if it has
-# Stable-Baselines3. Looking for the modules takes a moment, importing them seconds.
+# Finds a Python with Stable-Baselines3: that of the session's server, or another that gym_client()
+# would use. It looks for the modules without importing them, because importing takes seconds.
 sb3_python <- function(call) {
   running <- lapply(the_session$servers, function(server) server$python)
   pythons <- unique(c(unlist(running, use.names = FALSE), python_candidates()))
@@ -35,12 +35,12 @@ run_sb3 <- function() sub("'gym_server'", "'gym_server.sb3'", run_server, fixed 
 
 #' Run a job in a child process
 #'
-#' The child ends at its next step when its standard input is closed. That happens when the user
+#' The child ends at its next step when its standard input is closed. This happens if the user
 #' interrupts R, and also if R is killed.
 #' @param job The job, a list. Its `task` is `"train"`, `"convert"`, `"play"` or `"act"`.
 #' @param folder The folder of its files.
 #' @param poll A function that is called several times a second.
-#' @return A list: what the job says in `result.json`, and `interrupted`.
+#' @return A list: the contents of `result.json`, which the job writes, and `interrupted`.
 #' @noRd
 run_sb3_job <- function(job, folder, python, call, poll = function() NULL) {
   file <- file.path(folder, "job.json")
@@ -78,8 +78,8 @@ read_bytes <- function(file) readBin(file, "raw", file.size(file))
 
 read_json_file <- function(file) from_json(paste(readLines(file, warn = FALSE), collapse = "\n"))
 
-# Waits as long as its step takes, which may be the update after a long rollout, or an episode that
-# is played. A second interrupt leaves this, and the child is killed.
+# Waits until the child has finished its step, which may be the update after a long rollout, or a
+# whole episode. A second interrupt stops waiting and kills the child.
 end_child <- function(process) {
   cli::cli_inform(c(i = "Ending it as soon as possible."))
   close_server_input(list(process = process))
@@ -97,7 +97,7 @@ abort_child <- function(process, log, call) {
   )
 }
 
-# An error that the job reports: an argument's, or one of the training.
+# Makes an R error of an error that the job reports: of an argument, or during training.
 sb3_error <- function(error, call) {
   known <- unlist(error$known)
   named <- regmatches(error$message, regexpr("(?<=\")[^\"]+(?=\")", error$message, perl = TRUE))

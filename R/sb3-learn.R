@@ -1,90 +1,91 @@
 #' Train with Stable-Baselines3
 #'
-#' Train a policy with [Stable-Baselines3](https://stable-baselines3.readthedocs.io) or
-#' [sb3-contrib](https://sb3-contrib.readthedocs.io) in a Python process of its own, and get it back
-#' as a policy of this package: SAC for robots, and other algorithms that R does not have, on large
+#' Train a policy in Python with [Stable-Baselines3](https://stable-baselines3.readthedocs.io) or
+#' [sb3-contrib](https://sb3-contrib.readthedocs.io), and get it back as a policy of this package.
+#' Use it for algorithms that this package does not have, such as SAC for robots, and for large
 #' networks and GPUs.
 #'
-#' The process uses the server's Python. `gym_server_install(extras = "sb3")` installs
-#' Stable-Baselines3 and PyTorch there (some gigabytes on Linux, where PyTorch comes with what a GPU
-#' needs). `learn_sb3()` writes a job to a folder, runs `python -m gym_server.sb3 job.json`, shows
-#' the progress and reads the files that come of it. An interrupt ends the training at its next step
-#' and keeps the policy. If R is killed, the process ends, too.
+#' The training is a process of its own, which uses the server's Python. `gym_server_install(extras
+#' = "sb3")` installs Stable-Baselines3 and PyTorch there. (On Linux this takes some gigabytes,
+#' because PyTorch includes what a GPU needs.) `learn_sb3()` writes a job to a folder, runs `python
+#' -m gym_server.sb3 job.json`, shows the progress and reads the files that the process writes. An
+#' interrupt ends the training at its next step and keeps the policy. If R is killed, the process
+#' ends, too.
 #'
 #' # Algorithms and their arguments
 #'
-#' `"PPO"`, `"A2C"`, `"DQN"`, `"SAC"`, `"TD3"` and `"DDPG"` of Stable-Baselines3, `"TQC"`, `"TRPO"`,
-#' `"QRDQN"`, `"CrossQ"`, `"RecurrentPPO"` and `"MaskablePPO"` of sb3-contrib. Their arguments in
-#' `...` have the names of Python's, such as `learning_rate`, `buffer_size` or `policy_kwargs =
-#' list(net_arch = c(400, 300), activation_fn = "ReLU")`. As in rl-baselines3-zoo, `learning_rate =
-#' "lin_3e-4"` decreases from 3e-4 to 0, and `noise_type = "normal"` with `noise_std` adds noise to
-#' the actions of TD3 and DDPG.
+#' The algorithms are `"PPO"`, `"A2C"`, `"DQN"`, `"SAC"`, `"TD3"` and `"DDPG"` of Stable-Baselines3,
+#' and `"TQC"`, `"TRPO"`, `"QRDQN"`, `"CrossQ"`, `"RecurrentPPO"` and `"MaskablePPO"` of
+#' sb3-contrib. Their arguments in `...` have the same names as in Python, such as `learning_rate`,
+#' `buffer_size` or `policy_kwargs = list(net_arch = c(400, 300), activation_fn = "ReLU")`. As in
+#' rl-baselines3-zoo, `learning_rate = "lin_3e-4"` decreases from 3e-4 to 0, and `noise_type =
+#' "normal"` with `noise_std` adds noise to the actions of TD3 and DDPG.
 #'
-#' For some environments the values of
-#' [rl-baselines3-zoo](https://github.com/DLR-RM/rl-baselines3-zoo) are presets, see
-#' [agent_presets()]. A message says so. Arguments that you give replace them. Without a preset the
-#' defaults are the library's.
+#' For some environments there are presets with the values of
+#' [rl-baselines3-zoo](https://github.com/DLR-RM/rl-baselines3-zoo), see [agent_presets()]. If a
+#' preset is used, a message says so. Arguments that you give replace its values. Without a preset,
+#' the library's own defaults hold.
 #'
-#' `"MlpPolicy"` is a network of full layers, `"CnnPolicy"` one for pictures, `"MultiInputPolicy"`
-#' one for a Dict. Those of RecurrentPPO, `"MlpLstmPolicy"` and so on, remember earlier
-#' observations. MaskablePPO needs environments that say which actions are valid, in
-#' `info["action_mask"]` as Taxi-v4 does, or by a method `action_masks()`.
+#' `"MlpPolicy"` is a network of fully connected layers, `"CnnPolicy"` is for pictures, and
+#' `"MultiInputPolicy"` is for a Dict. The policies of RecurrentPPO, such as `"MlpLstmPolicy"`,
+#' remember earlier observations. MaskablePPO needs an environment that says which actions are
+#' valid: in `info["action_mask"]`, as Taxi-v4 does, or by a method `action_masks()`.
 #'
 #' # Atari
 #'
-#' With a `"CnnPolicy"`, games such as `"ALE/Pong-v5"` are treated as by AtariWrapper of
-#' Stable-Baselines3: up to 30 steps without an action at the start, each action for 4 frames (for
-#' `frameskip` of them, if it is in `env_kwargs`), and pictures in grey of 84 x 84 pixels, four
-#' together. For training only, rewards are clipped to -1, 0 and 1, and an episode ends with a life.
-#' Evaluations and [rollout()] play whole games with their scores. The element `agent$preprocessing`
-#' of the result has these settings, and the probability that an action is repeated
-#' (`repeat_action_probability`, 0.25 in the games of version 5). In the history `mean_length`
-#' counts frames.
+#' With a `"CnnPolicy"`, games such as `"ALE/Pong-v5"` are preprocessed as by AtariWrapper of
+#' Stable-Baselines3. An episode starts with up to 30 steps without an action. Each action is taken
+#' for 4 frames (or as many as `frameskip` in `env_kwargs` says). An observation is the last four
+#' pictures, in grey and of 84 x 84 pixels. For training only, rewards are clipped to -1, 0 and 1,
+#' and an episode ends with a life. Evaluations and [rollout()] play whole games with their scores.
+#' The element `agent$preprocessing` of the result has these settings, and the probability that an
+#' action is repeated (`repeat_action_probability`, 0.25 in the games of version 5). In the history,
+#' `mean_length` counts frames.
 #'
 #' For training the vector environment of `ale-py` steps all `num_envs` games in threads, as many as
-#' there are processors. It does not press the fire button after a lost life, and pixels of what
-#' moves can be a little lighter or darker than with AtariWrapper. Wrappers, and arguments of the game
-#' that it lacks, such as `mode`, are for AtariWrapper, which steps one game after another.
+#' there are processors. It does not press the fire button after a lost life, and moving things can
+#' be a little lighter or darker than with AtariWrapper. If you use wrappers, or arguments of the
+#' game that it lacks, such as `mode`, AtariWrapper steps one game after another instead.
 #'
 #' `vignette("solved")` has the time of a training on a GPU.
 #'
 #' # The policy
 #'
-#' A network of full layers becomes a [policy_network()]. It acts in R alone, and [rollout()] plays
-#' it beside the environment. Actions must be Discrete or a Box, and observations numbers; the
-#' activations tanh, ReLU, leaky ReLU and logistic are known. With `normalize` the network has the
-#' moments of the observations. Its actions differ from those of `model.predict(deterministic =
-#' True)` by less than 1e-5 of their range, because PyTorch calculates in single precision.
-#' State-dependent exploration (`use_sde`) does not come back: the network takes the most likely
-#' actions.
+#' A network of fully connected layers becomes a [policy_network()], which acts without Python.
+#' [rollout()] plays it in the server's processes. This needs a Discrete or Box action space,
+#' observations that are numbers, and one of the activations tanh, ReLU, leaky ReLU and logistic.
+#' With `normalize` the network keeps the moments of the observations. Its actions differ from those
+#' of `model.predict(deterministic = True)` by less than 1e-5 of their range, because PyTorch
+#' calculates in single precision. The network does not have state-dependent exploration
+#' (`use_sde`). It takes the most likely actions.
 #'
 #' Any other policy, such as a convolutional or recurrent one, stays with Stable-Baselines3. It has
 #' the class `gym_policy_sb3` and holds its weights as safetensors, so [saveRDS()] keeps it.
 #' [rollout()], [evaluate_policy()] and [animate()] play its whole episodes in a Python process,
 #' which makes the environment itself and ends afterwards. So they need the environment's id.
-#' [predict()] and [act()] start such a process, too, which takes seconds: ask about many
-#' observations at once. These are what the policy sees, for Atari arrays of 4 x 84 x 84 numbers
-#' from 0 to 255. Each counts as the first one of an episode. The policy takes the most likely
-#' actions.
+#' [predict()] and [act()] start such a process, too, which takes seconds. So ask about many
+#' observations at once. Give observations in the form that the policy sees; for Atari these are
+#' arrays of 4 x 84 x 84 numbers from 0 to 255. Each observation counts as the first one of an
+#' episode. The policy takes the most likely actions.
 #'
 #' # Going on
 #'
-#' `checkpoint` is a folder: the model as a zip file, its replay buffer (up to 4 GB) and moments,
-#' written at each evaluation and at the end. The same call goes on with the remaining steps. A
-#' larger `total_steps` goes on with a finished training. Schedules refer to the whole. The training
-#' begins a new episode and draws other random numbers, so the result is not the same to the bit as
-#' that of an uninterrupted one.
+#' `checkpoint` is a folder. At each evaluation and at the end, the training writes there the model
+#' as a zip file, its replay buffer (up to 4 GB) and its moments. Make the same call again to go on
+#' with the remaining steps. With a larger `total_steps` a finished training goes on, too. Schedules
+#' refer to the whole training. A training that goes on begins a new episode and draws different
+#' random numbers, so its result is not exactly that of an uninterrupted training.
 #'
 #' @param algorithm The algorithm, a string; see below.
 #' @param env The id of an environment of the server, a string.
 #' @param total_steps The number of steps of the environment, a whole number. It may be left out if
 #'   there is a preset.
 #' @param ... Arguments of the algorithm, by their Python names.
-#' @param policy The policy's name in Stable-Baselines3, a string. The default is that of the
-#'   preset, or `"MlpPolicy"`.
+#' @param policy The policy's name in Stable-Baselines3, a string. The default is the preset's, or
+#'   `"MlpPolicy"`.
 #' @param env_kwargs The arguments of the environment, a list with names.
-#' @param num_envs The number of sub-environments, a whole number. The default is 1, or that of the
-#'   preset. One process steps them one after another (Atari's in threads); the network gets all
+#' @param num_envs The number of sub-environments, a whole number. The default is the preset's, or
+#'   1. One process steps them one after another (Atari games in threads). The network gets all
 #'   their observations together.
 #' @param normalize Normalise observations and rewards by `VecNormalize`? `FALSE`, the default,
 #'   `TRUE`, or a list of its arguments, such as `list(norm_reward = FALSE)`. The log and all
@@ -96,25 +97,25 @@
 #'   the training. `NULL`, the default, uses the environment's target, as in [train_agent()].
 #' @param eval_every The number of steps between evaluations for the learning curve, a whole
 #'   number. `NULL`, the default, is a tenth of `total_steps`.
-#' @param eval_episodes_curve The number of episodes for a point of the curve, a whole number. The
-#'   default is 10. With 0 there is no curve.
+#' @param eval_episodes_curve The number of episodes for a point of the learning curve, a whole
+#'   number. The default is 10. With 0 there is no learning curve.
 #' @param eval_episodes The number of episodes of the final evaluation, a whole number of at
 #'   least 2. The default is 100.
-#' @param checkpoint `NULL`, the default, or the folder that keeps the training.
+#' @param checkpoint The folder that keeps the training, a string, or `NULL`, the default.
 #' @param resume Go on with the training in that folder? `TRUE`, the default, or `FALSE`, which
 #'   starts again and replaces it.
 #' @param log As for [train_agent()].
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param client The client of the server that plays the final evaluation. The default is the
 #'   session's client, [gym_client()].
-#' @return As of [train_agent()]: an object of class `gym_training`, and with `seeds` one of class
-#'   [gym_trainings]. An iteration is a row of Stable-Baselines3's `progress.csv`, of at most a
-#'   hundred. Its returns are those of the episodes that ended since the last row. The history has
-#'   the columns that Stable-Baselines3 logs as `train/`.
-#' @section Errors: `gym_error_argument` for an invalid argument, also one that Stable-Baselines3
-#'   refuses; `gym_error_install` if it is not installed; `gym_error_checkpoint` for the folder of
-#'   another training; `gym_error_training` for an error during training, such as a loss that is
-#'   NaN. Its field `result` is the training with the last finite weights.
+#' @return The same as from [train_agent()]: an object of class `gym_training`, or with `seeds` of
+#'   class [gym_trainings]. An iteration is a row of Stable-Baselines3's `progress.csv`, which has
+#'   at most a hundred rows. Its returns are those of the episodes that ended since the last row.
+#'   The history also has the columns that Stable-Baselines3 logs as `train/`.
+#' @section Errors: `gym_error_argument` for an invalid argument, including those that
+#'   Stable-Baselines3 refuses; `gym_error_install` if it is not installed; `gym_error_checkpoint`
+#'   for the folder of another training; `gym_error_training` for an error during training, such as
+#'   a loss that is NaN. Its field `result` is the training with the last finite weights.
 #' @references A. Raffin et al. (2021), Stable-Baselines3: reliable reinforcement learning
 #'   implementations, Journal of Machine Learning Research 22(268).
 #'
@@ -194,7 +195,7 @@ check_sb3_env <- function(env, call) {
   )
 }
 
-# The user's values replace the preset's, and what is left has the library's defaults.
+# The user's values replace the preset's. Without either, the library's defaults hold.
 with_sb3_preset <- function(settings) {
   env <- settings$env
   preset <- find_preset(settings$algorithm, env, settings$env_kwargs, "sb3-presets.csv")
@@ -274,7 +275,8 @@ train_sb3 <- function(settings, files, python, progress, client, call) {
   training
 }
 
-# A function that shows the last row of the table that the child writes, and copies it to the log.
+# Makes a function that reads the table that the child writes, shows its last row and copies the
+# table to the log.
 sb3_poll <- function(folder, log, show) {
   table <- file.path(folder, "progress.csv")
   read <- -Inf
@@ -284,7 +286,7 @@ sb3_poll <- function(folder, log, show) {
       return()
     }
     read <<- changed
-    # The child may be writing it.
+    # The child may be writing the file right now.
     rows <- tryCatch(sb3_progress(folder), error = function(cnd) NULL)
     if (NROW(rows)) show(rows[nrow(rows), ])
     if (!is.null(log)) file.copy(table, log, overwrite = TRUE)
@@ -330,7 +332,7 @@ go_on_or_begin <- function(job, folder, files, call) {
   sb3_forget_later(folder)
 }
 
-# The whole log in the form of every training's.
+# Writes the log in the form that all trainings have.
 log_sb3 <- function(training, settings, folder, call) {
   rows <- function(table) lapply(seq_len(nrow(table)), function(i) as.list(table[i, ]))
   state <- list(

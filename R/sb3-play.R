@@ -1,10 +1,12 @@
-# Policies that stay with Stable-Baselines3, because R has no such network: convolutional and
-# recurrent ones, those that need a mask of valid actions, or whose observations have several parts.
-# They are kept as data, and play in a child process, which makes the environment as for training.
+# Policies that stay with Stable-Baselines3, because this package has no such networks:
+# convolutional and recurrent policies, and policies that need a mask of valid actions or whose
+# observations have several parts. R keeps them as data. A child process plays them and makes the
+# environment in the same way as for training.
 
 #' Make a policy of Stable-Baselines3 that is not bound to an environment
 #' @param bytes A safetensors file, a raw vector: PyTorch's weights, and the moments.
-#' @param about What else makes it: `algorithm`, `policy` and `arguments`, a list.
+#' @param about What else is needed to make the policy, a list: `algorithm`, `policy` and
+#'   `arguments`.
 #' @noRd
 new_sb3_policy <- function(bytes, about) {
   structure(
@@ -45,7 +47,7 @@ policy_bind.gym_policy_sb3 <- function(policy, env, call = rlang::caller_env()) 
   policy
 }
 
-# Whether a policy sees the pictures of an Atari game, which are made smaller, and four together.
+# Does the policy see the pictures of an Atari game? These are preprocessed.
 sees_game <- function(policy, env, kwargs) {
   grepl("^Cnn", policy) && grepl("^(.*:)?ALE/", env) && identical(kwargs$obs_type %||% "rgb", "rgb")
 }
@@ -65,7 +67,7 @@ sb3_env_job <- function(algorithm, policy, env, kwargs) {
 #' Run a job of a policy
 #' @param job What the job has besides the environment.
 #' @param tensors Further files: a list of raw vectors by name.
-#' @param read A function of the folder and of what the job says.
+#' @param read A function of the folder and of the job's result.
 #' @noRd
 run_policy_job <- function(policy, job, read, call, tensors = list(),
                            poll = function(folder) NULL) {

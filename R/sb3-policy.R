@@ -1,6 +1,6 @@
-# Policies that Stable-Baselines3 trained, as networks of this package.
+# Converts policies that Stable-Baselines3 trained to networks of this package.
 
-#' Make a policy of what a job of Stable-Baselines3 has written
+#' Make a policy from the files of a job of Stable-Baselines3
 #' @param folder The job's folder.
 #' @return A [policy_network()], or a policy of class `gym_policy_sb3`, that is not bound yet.
 #' @noRd
@@ -19,8 +19,8 @@ sb3_policy <- function(folder) {
     clip_obs = about$clip_obs %||% 10
   )
   if (!is.null(about$count)) {
-    # Stable-Baselines3 divides by the root of the variance and a small number; ours by that of
-    # the squares over the count less one.
+    # Stable-Baselines3 divides by the root of the variance plus a small number. This package
+    # divides by the root of the sum of squares over (count - 1), so give it the fitting sum.
     count <- max(about$count, 2)
     variance <- read$tensors$variance
     policy$moments <- new_moments(count, read$tensors$mean, variance * (count - 1))
@@ -34,8 +34,9 @@ sb3_policy <- function(folder) {
 #'   text, or the algorithm's default.
 #' @param moments For such a file: how the observations were normalised in training (by
 #'   `VecNormalize`), a list of the numeric vectors `mean` and `variance`, and optionally of the
-#'   numbers `clip_obs` (10 by default) and `epsilon` (1e-8). `FALSE` if they were not. The default,
-#'   `NULL`, is the same, but an error if a file `vecnormalize.pkl` is beside the zip file.
+#'   numbers `clip_obs` (10 by default) and `epsilon` (1e-8). `FALSE` if they were not normalised.
+#'   `NULL`, the default, means the same, but raises an error if there is a file `vecnormalize.pkl`
+#'   beside the zip file.
 #' @export
 as_policy.character <- function(x, ..., activation = NULL, moments = NULL) {
   check_dots_empty(...)

@@ -1,6 +1,6 @@
-# A training by Stable-Baselines3 as a result of this package, from the files of its job.
+# Makes a result of this package from the files of a training by Stable-Baselines3.
 
-# The rows of progress.csv, those before the last start included.
+# Reads the rows of progress.csv, including those from before the training was resumed.
 sb3_progress <- function(folder) {
   files <- file.path(folder, c("earlier.csv", "progress.csv"))
   tables <- lapply(files[file.exists(files)], function(file) {
@@ -19,7 +19,8 @@ sb3_progress <- function(folder) {
   do.call(rbind, rows)
 }
 
-# Rows and evaluations after the checkpoint would be there twice when the training goes on.
+# Removes rows and evaluations from after the checkpoint, because the training will write them again
+# when it goes on.
 sb3_forget_later <- function(folder) {
   state <- sb3_state(folder)
   rows <- utils::head(sb3_progress(folder), state$rows %||% 0)
@@ -121,7 +122,7 @@ sb3_training <- function(settings, folder, result, client, call) {
   )
 }
 
-# The policy plays episodes with seeds that no training has seen.
+# The final evaluation: the policy plays episodes with seeds that no training has seen.
 sb3_final <- function(vector_env, policy, settings, iteration, call) {
   own <- new_generator(stream = parallel::nextRNGSubStream(seed_stream(settings$seed)))
   seed <- with_generator(own, draw_seed())
@@ -132,7 +133,7 @@ sb3_final <- function(vector_env, policy, settings, iteration, call) {
   evaluation_row(iteration, "final", evaluation)
 }
 
-# The agent of such a training: what was asked for, and the policy.
+# The agent of such a training: the user's settings and the policy.
 new_sb3_agent <- function(algorithm, arguments, preset) {
   structure(
     list(algorithm = algorithm, arguments = arguments, preset = preset),
