@@ -1,9 +1,9 @@
-# make demo and make test work on a fresh machine; what they install, and where, is in tools/setup.
+# make demo and make test work on a fresh machine. tools/setup says what they install, and where.
 
 .PHONY: help demo pages bench test test-all soak check lint coverage document site clean
 .NOTPARALLEL:
 
-# R reads and writes UTF-8 only where the locale says so, and a bare container names no locale.
+# R reads and writes UTF-8 only if the locale says so, and a bare container has no locale.
 ifeq ($(LC_ALL)$(LC_CTYPE)$(LANG),)
 ifeq ($(shell uname -s),Linux)
 export LANG = C.UTF-8

@@ -2,9 +2,9 @@
 #'
 #' Learn a policy (the actor) and the values of states (the critic) together. A softmax turns the
 #' actor's preferences into the probabilities of the actions. A preference rises if its action led
-#' to more than the critic expected, and falls if it led to less (Barto, Sutton and Anderson 1983;
-#' Sutton and Barto 2018, section 13.5). Both have accumulating eligibility traces. `lambda = 0`
-#' turns them off.
+#' to a higher return than the critic expected, and falls if it led to a lower one (Barto, Sutton
+#' and Anderson 1983; Sutton and Barto 2018, section 13.5). The actor and the critic have
+#' accumulating eligibility traces. `lambda = 0` and `actor_lambda = 0` turn them off.
 #'
 #' @inheritParams agent_sarsa
 #' @param learning_rate How far a value of the critic moves towards its target, a number above 0 and
@@ -49,7 +49,7 @@ agent_actor_critic <- function(discount = 0.99, learning_rate = 0.1, actor_rate 
 #' @export
 agent_start.gym_agent_actor_critic <- function(agent, policy) {
   agent <- NextMethod()
-  # The weights are the critic's; the actor's are the preferences.
+  # `weights` are those of the critic. The actor's weights are `preferences`.
   columns <- count_actions(agent)
   preferences <- if (!is.null(agent$weights)) matrix(0, nrow(agent$weights), columns)
   possible <- policy$possible
@@ -85,7 +85,7 @@ learner_of.gym_agent_actor_critic <- function(agent, draw) {
       traces <- trace_of(sub_env)
       ahead <- if (terminated) 0 else critic$row(after)
       error <- reward + discount * ahead - critic$row(x)
-      # The gradient of the log probability, for the preferences of all actions.
+      # The gradient of the action's log-probability by the preferences of all actions.
       towards <- -softmax(actor$row(x))
       towards[[column]] <- towards[[column]] + 1
       gradient <- critic$gradient(x)

@@ -2,8 +2,8 @@
 #'
 #' Take steps along random directions, weighted by how much better the policy is in the direction
 #' than against it (Mania, Guy and Recht 2018, Algorithm 2). Each iteration draws `directions`
-#' directions from the standard normal distribution. It plays the policies whose weights are the
-#' current ones plus and minus `noise` times each direction. It ranks directions by the better of
+#' directions from the standard normal distribution. It plays two policies for each direction: the
+#' current weights plus and minus `noise` times the direction. It ranks directions by the better of
 #' their two returns and keeps the `top` best. The step is `step_size` times the sum of (return with
 #' plus - return with minus) times direction, divided by `top` and by the standard deviation of the
 #' returns used (the one that divides by their number).
@@ -20,13 +20,13 @@
 #' A policy made with `normalize = TRUE` normalises observations in V1, too. It clips them at its
 #' `clip_obs`. Otherwise V2 does not clip them, as in the paper.
 #'
-#' As in the authors' code, there is no step if all returns used are equal, and an element of an
-#' observation that has not changed becomes 0. The authors' code keeps all directions with equal
-#' returns; this function keeps the first ones.
+#' As in the authors' code, the weights stay as they are if all returns used are equal, and an
+#' element of an observation that has never changed becomes 0. If directions tie, the authors' code
+#' keeps all of them; this function keeps the first ones.
 #'
 #' @param directions The number of directions per iteration, a whole number of at least 1. An
 #'   iteration plays twice as many candidates.
-#' @param top How many of the directions make up the step, a whole number from 1 to `directions`.
+#' @param top The number of directions that the step uses, a whole number from 1 to `directions`.
 #'   The default is half of them.
 #' @param step_size The step size, a number above 0.
 #' @param noise The distance of candidates from the weights, a number above 0.
@@ -81,7 +81,7 @@ agent_start.gym_agent_ars <- function(agent, policy) {
       inherits(policy$observation_space, "gym_space_discrete"), "version", agent$version, NULL,
       "ARS {agent$version} normalizes observations, and those of {env_text(policy)} are
        {format(policy$observation_space)}.",
-      i = '`version = "{sub("V2", "V1", agent$version)}"` takes them as they are.'
+      i = '`version = "{sub("V2", "V1", agent$version)}"` leaves them unchanged.'
     )
     if (is.null(policy$moments)) {
       agent$policy$moments <- no_moments()

@@ -1,11 +1,11 @@
 # Bandits with contexts: linear models that learn in an environment, or from logged steps.
 
-# Returns what learn_bandit() returns. What was played is a list: `reward`, of the steps that the
-# learner saw, and `weights`, a matrix with a column for each action.
+# Makes the result of learn_bandit(). `played` is a list: `reward`, of the steps that the learner
+# saw, and `weights`, a matrix with a column for each action.
 learned_with_contexts <- function(played, context, steps, method, confidence, seed, env_id) {
   seen <- length(played$reward)
   colnames(played$weights) <- row_texts(steps$actions)
-  # The policy cannot be learned again in folds: that would be another play.
+  # The policy cannot be learned again in folds, because other data would lead to other actions.
   context$label <- paste0(if (method == "linucb") "LinUCB" else "linear Thompson sampling",
                           ", confidence ", number_text(confidence))
   structure(
@@ -29,7 +29,7 @@ replay_bandit <- function(data, method, confidence, seed, call) {
   steps <- steps_of(data, call)
   context <- context_regression(steps$state)
   x <- context$block(steps$state)
-  # As if all actions had been equally likely.
+  # Each row is used with a probability that makes all actions equally likely.
   chosen <- steps$probability %||% 1
   played <- with_generator(
     new_generator(seed),
@@ -38,7 +38,7 @@ replay_bandit <- function(data, method, confidence, seed, call) {
   abort_if(
     !length(played$reward), "env", data, call,
     "The learner never chose the action of the data.",
-    i = "There are too few rows for so many actions, or too unequal probabilities."
+    i = "There are too few rows for so many actions, or their probabilities differ too much."
   )
   learned_with_contexts(played, context, steps, method, confidence, seed, "logged data")
 }
@@ -60,7 +60,8 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
   world <- single_env(env)
   actions <- table_index(world$action_space, "actions", call)
   observed <- world$observation_space
-  # Numbers that only tell values apart become factors, if there are not too many.
+  # Numbers that only name a value, as in a Discrete space, become factors, if there are not too
+  # many.
   index <- space_index(observed)
   levels <- if (!is.null(index) && index$count <= 1000) {
     lapply(observation_columns(observed, index$value(seq_len(index$count))), unique)
@@ -86,7 +87,7 @@ live_bandit <- function(env, method, confidence, horizon, seed, call) {
   learned_with_contexts(played, context, steps, method, confidence, seed, env$spec$id)
 }
 
-# Contexts as numbers: the columns of a linear model without interactions.
+# Turns contexts into numbers: the columns of a linear model without interactions.
 context_regression <- function(states) {
   columns <- paste(sprintf("`%s`", names(states)), collapse = " + ")
   terms <- stats::terms(stats::as.formula(paste("~", columns), globalenv()))
@@ -99,9 +100,9 @@ context_regression <- function(states) {
   )
 }
 
-# Linear models of the rewards of `many` actions. Each has the inverse of its matrix of squares,
-# which a step changes by one product (Sherman and Morrison). `choose(now, tie)` returns the action
-# for the numbers of a context; `tie`, from 0 to 1, tells which of several best ones it is.
+# Makes linear models of the rewards of `many` actions. Each keeps the inverse of its matrix X'X,
+# which a step updates by one outer product (Sherman and Morrison). `choose(now, tie)` returns the
+# action for the numbers of a context. If several actions are best, `tie`, from 0 to 1, selects one.
 context_learner <- function(width, many, draws, confidence) {
   inverse <- rep(list(diag(width)), many)
   sums <- weights <- matrix(0, width, many)
@@ -129,8 +130,8 @@ context_learner <- function(width, many, draws, confidence) {
   )
 }
 
-# Shows the rows one after the other, and lets the learner learn from those it agrees with. `used`
-# is the probability with which a row is used.
+# Shows the learner the rows one after the other. It learns from those in which it chooses the
+# action of the data. `used` is the probability with which a row is used.
 replay_steps <- function(x, steps, used, draws, confidence) {
   learner <- context_learner(ncol(x), nrow(steps$actions), draws, confidence)
   used <- stats::runif(nrow(x)) < used

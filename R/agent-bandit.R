@@ -1,8 +1,8 @@
 #' Learn in a bandit
 #'
-#' Let many learners play a bandit, each with its own arms, and record the mean of their rewards per
-#' step. This is the ten-armed testbed of Sutton and Barto (2018, section 2.3). The learners are
-#' independent. They play together only because that is faster.
+#' Let many learners play a bandit, each with its own arms, and record the mean of their rewards in
+#' each step. This is the ten-armed testbed of Sutton and Barto (2018, section 2.3). The learners
+#' are independent. They play together only because that is faster.
 #'
 #' | `method` | which arm it takes | section |
 #' |---|---|---|
@@ -22,13 +22,14 @@
 #'
 #' `"linucb"` and `"thompson"` have a linear model of the context for every action (with a ridge of
 #' 1). They learn in an environment, whose observations are the contexts: a Box gives numbers, and
-#' each value of a Discrete or MultiDiscrete has a weight of its own. Or they learn from logged
-#' steps, which have a context (the state), an action and a reward each. Logged data is
-#' replayed (Li 2011): in each row the learner sees the context and chooses; only if it chooses the
-#' action of the data it sees the reward, and learns. If the data's actions were drawn with equal
-#' probabilities, the rewards that it saw are those that it would have got, on average. With the
-#' column `probability`, a row is used with a probability proportional to its inverse, which makes
-#' the rest as if all actions had been equally likely.
+#' each value of a Discrete or MultiDiscrete has a weight of its own. They also learn from logged
+#' steps, each of which has a context (the state), an action and a reward. Logged data is replayed
+#' (Li 2011): in each row the learner sees the context and chooses an action. If this is the action
+#' of the data, the learner sees the reward and learns from it. Otherwise it skips the row. If the
+#' actions of the data were drawn with equal probabilities, the mean of the rewards that it sees
+#' estimates what it would have got by itself. If the data has the column `probability`, each row is
+#' used with a probability proportional to 1 / `probability`, as if all actions had been equally
+#' likely.
 #'
 #' @param env A bandit made by [bandit()]. For a method with contexts an environment with countable
 #'   actions, its id or an object of [gym_make()] or [gym_env()]; or logged steps, as for
@@ -46,8 +47,8 @@
 #'   reward so far, `FALSE` for 0.
 #' @param learners The number of learners, a whole number of at least 1. The default is 2,000.
 #' @param horizon The number of steps, a whole number. `NULL`, the default, plays one episode of the
-#'   bandit, and 1,000 steps with contexts. An interrupt of these returns what was learned until
-#'   then. From logged data it is not used.
+#'   bandit, and 1,000 steps with contexts. If you interrupt these steps, the call returns what was
+#'   learned until then. Logged data ignores `horizon`.
 #' @param seed A whole number that fixes all random numbers, as for [rollout()].
 #' @return An object of class `gym_bandit_learning`, with methods for [print()], [as.data.frame()]
 #'   and [plot()][plot.gym_bandit_learning()]. It is a list with the elements `curve`, a data frame
@@ -88,7 +89,7 @@
 #' learned
 #' predict(learned$policy, c(0.1, 0.9))
 #'
-#' # Logged clicks, and what a learner would have made of them.
+#' # Logged clicks: a learner replays them.
 #' set.seed(1)
 #' clicks <- data.frame(episode = 1:2000, age = runif(2000), action = sample(0:1, 2000, TRUE))
 #' clicks$reward <- rbinom(2000, 1, ifelse(clicks$action == 1, clicks$age, 0.5))
@@ -117,7 +118,7 @@ learn_bandit <- function(env,
   confidence <- confidence %||% 2
   if (is.null(problem)) {
     hint <- if (is.data.frame(env)) {
-      "From logged data `method = \"linucb\"` and `\"thompson\"` learn."
+      "To learn from logged data, use `method = \"linucb\"` or `\"thompson\"`."
     }
     abort_argument(env, "a bandit made by `bandit()`", "env", rlang::current_env(), hint)
   }
@@ -188,7 +189,7 @@ choose_arms <- function(rule, values, taken, step) {
   }
   if (rule$method == "ucb") {
     values <- values + rule$confidence * sqrt(log(step) / taken)
-    # An arm that was never taken comes first.
+    # Take an arm that was never taken before any other.
     values[taken == 0] <- Inf
   }
   arm <- any_best_column(values)

@@ -10,10 +10,10 @@
 #' layers of 64 ReLU neurons. Its `epsilon` is the agent's. The loss is Huber's. Its gradient is
 #' clipped to `max_grad_norm` and passed to Adam (Kingma and Ba 2015).
 #'
-#' An iteration plays whole episodes, by default one or two, with the same `epsilon` and the same
-#' weights. Then it makes `updates_per_step` updates per step; a remainder is carried over to the
+#' An iteration plays whole episodes, by default a single one, with the same `epsilon` and the same
+#' weights. Then it makes `updates_per_step` updates per step. A remainder is carried over to the
 #' next iteration. A truncated episode would have gone on, so the value of its last state counts.
-#' After a terminated one there is nothing to come. If the policy has `normalize = TRUE`, the first
+#' After a terminated episode no reward can follow. If the policy has `normalize = TRUE`, the first
 #' iteration plays random episodes, as in [agent_ppo()].
 #'
 #' @param memory The largest number of steps in the memory, a whole number. The oldest are
@@ -128,7 +128,7 @@ agent_tell.gym_agent_dqn <- function(agent, results) {
   now <- scheduled_settings(agent, "learning_rate")
   agent$log[c("exploration_rate", "learning_rate")] <- c(epsilon_now(agent), now$learning_rate)
   steps <- length(results$trajectories$reward)
-  # Take it out of the agent, so that R can write into it without another copy.
+  # Take the memory out of the agent, so that R can write into it without copying it.
   memory <- agent$memory
   agent$memory <- NULL
   memory <- add_to_memory(memory, remembered(agent$policy, results$trajectories))
@@ -194,7 +194,8 @@ dqn_update <- function(policy, state, rows, settings) {
   outputs <- forward$outputs
   taken <- places_of_actions(nrow(outputs), rows$action)
   error <- outputs[taken] - wanted
-  # Huber's loss: the slope of the squared error up to 1, constant beyond it.
+  # The slope of Huber's loss: that of the squared error up to an error of 1, and constant beyond
+  # it.
   slopes <- matrix(0, nrow(outputs), n)
   slopes[taken] <- pmax.int(-1, pmin.int(error, 1)) / n
   gradient <- clip_norm(backward_network(forward, slopes), settings$max_grad_norm)
@@ -217,7 +218,7 @@ new_memory <- function(size) {
 # Adds a matrix with a step in each column.
 add_to_memory <- function(memory, new) {
   n <- ncol(new)
-  # If there are more than fit, only the last ones.
+  # If there are more steps than fit, keep the last ones.
   kept <- seq.int(max(1, n - memory$size + 1), n)
   at <- (memory$count + kept - 1) %% memory$size + 1
   room <- max(0L, ncol(memory$steps))
@@ -231,8 +232,8 @@ add_to_memory <- function(memory, new) {
   memory
 }
 
-# A column of the memory: the observation, the next observation, action, reward, and whether it
-# terminated.
+# Makes columns of the memory: the observation, the next observation, the action, the reward, and
+# whether the episode terminated.
 remembered <- function(policy, trajectories) {
   rbind(
     t(number_rows(trajectories$observation)), t(number_rows(trajectories$next_observation)),

@@ -14,17 +14,17 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
   space <- policy$observation_space
   abort_if(
     length(space$shape) > 1L, "env", NULL, NULL,
-    "Agents that follow gradients need observations that are vectors; those of
+    "Agents that follow gradients need observations that are vectors, but those of
      {env_text(policy)} are of {format(space)}.",
     i = if (startsWith(policy$env_id %||% "", "ALE/")) {
-      '`obs_type = "ram"` observes the memory, 128 numbers, as in `learn_ppo("{policy$env_id}",
+      '`obs_type = "ram"` observes the 128 numbers of the memory: `learn_ppo("{policy$env_id}",
        obs_type = "ram", total_steps = 1e6)`.'
     },
     i = if (length(space$shape) == 3L) {
       '`env <- gym_wrap(gym_wrap(env, "GrayscaleObservation"), "ResizeObservation",
        shape = c(32, 32))` makes small grey pictures.'
     },
-    i = '`gym_wrap(env, "FlattenObservation")` makes vectors, with which it can learn.'
+    i = '`gym_wrap(env, "FlattenObservation")` makes vectors, from which the agent can learn.'
   )
   agent <- NextMethod()
   agent$iteration <- 0L
@@ -37,7 +37,7 @@ agent_start.gym_agent_gradient <- function(agent, policy) {
 #' @export
 agent_needs.gym_agent_gradient <- function(agent) c("returns", "trajectories")
 
-# The policy is played as it is, so its weights need not be asked for.
+# The policy is played as it is.
 #' @export
 agent_ask.gym_agent_gradient <- function(agent) NULL
 
@@ -49,8 +49,8 @@ default_policy.gym_agent_gradient <- function(agent) {
   policy_network(c(NA, 64, 64, NA), bias = TRUE, output = NA, init = "orthogonal")
 }
 
-# Observations are normalised from the first step of learning, with the moments of random episodes.
-# Moments that came later would change the policy at once.
+# Observations are normalised from the first step of learning, so their moments come from random
+# episodes. Moments that came later would suddenly change the policy.
 warm_up_episodes <- 8L
 
 is_warming_up <- function(agent) identical(agent$policy$moments$count, 0)
@@ -111,12 +111,12 @@ end_iteration <- function(agent, results) {
   agent
 }
 
-# If the weights are not finite, training ends with the last finite ones.
+# If the weights are not finite, training ends with an error whose result has the last finite ones.
 check_finite_weights <- function(weights, agent) {
   if (!all(is.finite(weights))) {
     gym_abort(
       c(paste0("The weights became NaN or infinite in iteration ", agent$iteration + 1L, "."),
-        i = "A smaller `learning_rate`, or observations that are normalized, may help."),
+        i = "A smaller `learning_rate` or normalized observations may help."),
       class = "gym_error_agent", iteration = agent$iteration + 1L, call = NULL
     )
   }
@@ -158,7 +158,7 @@ scheduled_settings <- function(agent, names) {
   agent
 }
 
-# An agent that follows the gradient of log-probabilities needs a policy that has them.
+# An agent that follows the gradient of log-probabilities needs a policy with probabilities.
 check_has_log_prob <- function(policy, name) {
   if (!has_log_prob(policy)) {
     box <- inherits(policy$action_space, "gym_space_box")
@@ -166,7 +166,7 @@ check_has_log_prob <- function(policy, name) {
       "policy", policy, NULL,
       '{name} needs a policy that draws its actions{if (box) ", with standard deviations"}, not
        {format(policy)}.',
-      i = '`output = "{if (box) "gaussian" else "softmax"}"` makes it one.'
+      i = 'Make it with `output = "{if (box) "gaussian" else "softmax"}"`.'
     )
   }
 }
@@ -213,8 +213,8 @@ scale_rewards <- function(reward, last, gamma, moments) {
   list(reward = pmax(-10, pmin(reward / max(deviation, 1e-4), 10)), moments = moments)
 }
 
-# A single advantage has no standard deviation. Minus its mean it would be 0 and teach nothing, so
-# it stays as it is, as in Stable-Baselines3.
+# A single advantage has no standard deviation. If its mean were subtracted, it would be 0 and
+# change nothing. So it stays as it is, as in Stable-Baselines3.
 standardized <- function(x) {
   n <- length(x)
   if (n < 2L) {
@@ -242,8 +242,8 @@ new_adam <- function(count) list(mean = numeric(count), square = numeric(count),
 #' @return A list: `weights` and `adam`.
 #' @noRd
 adam_step <- function(weights, gradient, adam, learning_rate, epsilon = 1e-8) {
-  # Each operation on all weights takes some percent of an update, so there are few. The
-  # result is 0.9 * mean + 0.1 * gradient.
+  # Each operation on all weights takes some percent of the time of an update, so use few. This mean
+  # is 0.9 * mean + 0.1 * gradient.
   steps <- adam$steps + 1
   mean <- adam$mean + 0.1 * (gradient - adam$mean)
   square <- adam$square + 0.001 * (gradient * gradient - adam$square)

@@ -2,12 +2,12 @@
 #'
 #' Learn the value of each action in each state as the mean of the returns that followed it, and act
 #' by these values with exploration (Sutton and Barto 2018, section 5.4). The agent learns from an
-#' episode only after its end. No value depends on another one.
+#' episode only after its end, from rewards alone: no value depends on another value.
 #'
-#' If `env` is an id on the server, the server's processes play all episodes of an iteration with
-#' the same table, and the agent learns from them afterwards. With exploring starts or a `mask`, R
-#' plays the episodes in several sub-environments. In a model or an environment in R, the agent
-#' learns after each episode.
+#' If you give `env` by its id, the server's processes play all episodes of an iteration with the
+#' same table, and the agent learns from them afterwards. With exploring starts or a `mask`, R plays
+#' the episodes in several sub-environments. In a model or an environment in R, the agent learns
+#' after each episode.
 #'
 #' With `exploring_starts = TRUE` the first action of each episode is drawn uniformly from all
 #' actions (section 5.3). The environment draws the first state.
@@ -23,10 +23,10 @@
 #' @param learning_rate `NULL`, the default, for the plain mean of all returns. A number above 0
 #'   and at most 1, or a function of the steps so far, gives later returns more weight.
 #' @param importance `"none"`, the default, learns the values of the policy that plays, exploration
-#'   included. `"weighted"` and `"ordinary"` learn the values of a policy that does not explore from
-#'   episodes of one that does, by importance sampling (off-policy learning; sections 5.5 to 5.7).
-#'   Weighted returns are the mean over those whose actions the policy might have taken, and every
-#'   visit counts.
+#'   included. `"weighted"` and `"ordinary"` learn the values of a policy that does not explore,
+#'   from episodes of a policy that does, by importance sampling (off-policy learning; sections 5.5
+#'   to 5.7). `"weighted"` divides by the sum of the weights and `"ordinary"` by the number of
+#'   returns. Every visit counts.
 #' @param target_policy The policy whose values `importance` learns, a [policy_table()]. The same
 #'   policy plays, but explores with `epsilon`; with `epsilon = 1` it is a random policy. `NULL`,
 #'   the default, uses the best policy so far.
@@ -143,8 +143,9 @@ on_policy <- function(agent, learning) {
 
 #' Learn the values of a policy that does not explore, from episodes of one that does
 #'
-#' The weight of a return is how much more likely the policy takes the actions after its own (Sutton
-#' and Barto 2018, section 5.7). The probabilities are those at the time of the action.
+#' The weight of a return is the ratio of two probabilities of the actions that followed: by the
+#' policy that is learned, and by the policy that played (Sutton and Barto 2018, section 5.7). The
+#' probabilities are those at the time of the action.
 #' @return As [on_policy()]; `visited()` returns the sums of weights.
 #' @noRd
 off_policy <- function(agent, learning, draw) {
@@ -194,12 +195,12 @@ agent_policy.gym_agent_monte_carlo <- function(agent) {
   if (is.null(agent$learns)) NextMethod() else agent$learns
 }
 
-# Where the server's processes play whole episodes, it learns by iterations ------------------
+# Learning from the episodes of an iteration ----------------------------------------------
 
 #' @export
 agent_needs.gym_agent_monte_carlo <- function(agent) c("returns", "trajectories")
 
-# It draws among actions with equal values.
+# If actions have equal values, draws one of them.
 #' @export
 agent_behavior.gym_agent_monte_carlo <- function(agent) {
   if (!plays_whole(agent)) {
@@ -235,7 +236,8 @@ agent_tell.gym_agent_monte_carlo <- function(agent, results) {
     returns <- returns[counted]
   }
   if (is.null(agent$learning_rate)) {
-    # All at once: the division of episodes into requests must not change the last bit of a sum.
+    # Add all returns at once: the last bit of a sum must not depend on how episodes were divided
+    # into requests.
     sums <- rowsum(cbind(returns, 1), cell)
     own <- as.double(rownames(sums))
     agent$visited[own] <- agent$visited[own] + sums[, 2L]
@@ -254,7 +256,7 @@ agent_tell.gym_agent_monte_carlo <- function(agent, results) {
   agent
 }
 
-# Where it learns after each episode ----------------------------------------------------------
+# Learning after each episode ---------------------------------------------------------------
 
 # Keeps the steps of an episode until it has ended.
 new_episode <- function() {
@@ -295,7 +297,8 @@ learn_monte_carlo <- function(env, ...) {
   )
 }
 
-# If the server's processes play the episodes, each iteration costs a request.
+# If the server's processes play the episodes, each iteration needs a request, so it has more
+# episodes.
 default_episodes <- function(env, given) {
   on_server <- rlang::is_string(env) && !is_registered(env) && !grepl(modelled_ids, env)
   whole <- learns_whole(given[["mask"]], given[["exploring_starts"]], given[["importance"]])

@@ -2,8 +2,8 @@
 #'
 #' Play whole episodes with a policy that draws its actions, estimate how much better each action
 #' was than a value network expected, and make the better actions more likely. The agent makes
-#' `epochs` passes over the steps in minibatches. Changes of an action's probability beyond `clip`
-#' do not count (Schulman et al. 2017).
+#' `epochs` passes over the steps in minibatches. If an action's probability has changed by more
+#' than `clip`, a further change in this direction brings no gain (Schulman et al. 2017).
 #'
 #' The policy is a [policy_network()] with the output `"softmax"` for a Discrete action space, or
 #' `"gaussian"` for a Box. By default it has two hidden layers of 64 tanh neurons. The value network
@@ -22,7 +22,8 @@
 #' result. The number of episodes is fixed before they are played: `batch_steps` divided by the mean
 #' length of the last iteration's episodes, rounded, at least `min_episodes` and at most four times
 #' the last number. An episode that the environment or `max_steps` truncated would have gone on, so
-#' the value of its last state replaces the rewards to come. A terminated episode has none to come.
+#' the value of its last state replaces the later rewards. After a terminated episode no reward can
+#' follow.
 #'
 #' If the policy has `normalize = TRUE`, the first iteration plays random episodes to get the first
 #' moments of observations. Later observations are added after each iteration's learning.
@@ -38,8 +39,8 @@
 #' @param gamma The discount, a number from 0 to 1. The default is 0.99.
 #' @param lambda How far advantages look ahead, a number from 0 (one step) to 1 (to the end of the
 #'   episode). The default is 0.95 (generalized advantage estimation, Schulman et al. 2016).
-#' @param clip How far the ratio of an action's new to its old probability may count from 1, a
-#'   number, a function of the steps so far, or `Inf`. The default is 0.2.
+#' @param clip How far from 1 the ratio of an action's new to its old probability may go before it
+#'   no longer counts, a number, a function of the steps so far, or `Inf`. The default is 0.2.
 #' @param entropy The weight of the policy's entropy in the loss, a number or a function of the
 #'   steps so far. The default is 0.
 #' @param value_weight The weight of the squared error of values, a number. The default is 0.5.
@@ -50,8 +51,8 @@
 #'   return and clip them at 10? `FALSE`, the default, or `TRUE`. The log shows the original
 #'   rewards.
 #' @param target_kl `NULL`, the default, or a number. Learning from an iteration stops before a
-#'   minibatch in which the policy has moved more than 1.5 times this number from the one that
-#'   played (an estimate of the Kullback-Leibler divergence).
+#'   minibatch in which the estimated Kullback-Leibler divergence from the policy that played is
+#'   more than 1.5 times this number.
 #' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars
 #' @param policy The policy. `NULL`, the default, uses the preset's policy, or the one described in
@@ -134,8 +135,8 @@ agent_tell.gym_agent_ppo <- function(agent, results) {
   }
   weights <- c(weight_vector(agent$policy), weight_vector(agent$value))
 
-  # Log-probabilities and values by the networks that played. The outputs of hidden layers for all
-  # steps are not kept: they would fill most of the memory after which R collects garbage.
+  # Log-probabilities and values by the networks that played. Do not keep the outputs of hidden
+  # layers for all steps: they would need much memory, and R would collect garbage more often.
   rows$log_prob <- forward_draws(agent$policy, weights, rows$inputs, rows$action)$draws$log_prob
   value <- expected_values(agent$value, rows$inputs)
   last_value <- expected_values(agent$value, rows$last_inputs)
@@ -211,8 +212,8 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
   advantage <- batch$advantage
   if (settings$normalize_advantages) advantage <- standardized(advantage)
 
-  # The objective is the smaller of ratio x advantage and clipped ratio x advantage; beyond the
-  # clip, in the direction of the advantage, it has no slope.
+  # The objective is the smaller of ratio x advantage and clipped ratio x advantage. If the ratio is
+  # beyond the clip in the direction of the advantage, the gradient is 0.
   log_ratio <- draws$log_prob - batch$log_prob
   ratio <- exp(log_ratio)
   clipped <- pmin.int(pmax.int(ratio, 1 - settings$clip), 1 + settings$clip)
@@ -226,7 +227,7 @@ ppo_gradient <- function(policy, value, weights, batch, settings) {
     ),
     backward_network(of_value, matrix(2 * settings$value_weight / n * error, 1L))
   )
-  # Means without mean(), whose method takes as long as a small product of matrices.
+  # Compute means without mean(), which takes as long as a small product of matrices.
   policy_loss <- -sum(objective) / n
   value_loss <- sum(error * error) / n
   entropy_loss <- -sum(draws$entropy) / n

@@ -7,12 +7,12 @@
 #' given by its id and has a row here. A message says so. Arguments that you give replace those of
 #' the preset.
 #'
-#' With one or two seeds the tables reached, where the best is 0.744 for FrozenLake, 0.913 for
-#' FrozenLake8x8, 7.93 for Taxi, -13 for CliffWalking and -0.043 for Blackjack: 0.73 to 0.74 (Q),
-#' 0.73 (Sarsa) and 0.71 to 0.73 (Monte Carlo) on the lake; 0.86 and 0.85 on the larger one; 7.87 to
-#' 7.89 and 7.4 to 7.7 in the taxi; -13 and -19 to -17 on the cliff; -0.075 in Blackjack, with a
-#' standard error of 0.014. Taxi's registered threshold of 8 is above the best, so a training uses
-#' its budget.
+#' With one or two seeds, the learners of tables reached these mean returns. FrozenLake (at best
+#' 0.744): 0.73 to 0.74 by Q-learning, 0.73 by Sarsa, 0.71 to 0.73 by Monte Carlo. FrozenLake8x8
+#' (0.913): 0.86 by Q-learning, 0.85 by Sarsa. Taxi (7.93): 7.87 to 7.89 by Q-learning, 7.4 to 7.7
+#' by Sarsa. CliffWalking (-13): -13 by Q-learning, -19 to -17 by Sarsa. Blackjack (-0.043): -0.075
+#' by Monte Carlo, with a standard error of 0.014. The registered threshold of Taxi, 8, is above the
+#' best possible return, so a training uses its whole budget.
 #'
 #' @param env_id The id of an environment, a string, to get its presets only. `NULL`, the default,
 #'   returns all.
@@ -35,7 +35,7 @@
 #'   their values to 0 over `total_steps`. `epsilon` decreases from 1 to its value over
 #'   `epsilon_steps`.}
 #'   \item{episodes, eval_every, total_steps, max_steps}{Of the training; `total_steps` is its
-#'   budget. Agents with long iterations are evaluated more often than every ten of them.}
+#'   budget. Agents with long iterations are evaluated more often than after every ten of them.}
 #'   \item{origin, source, tried}{`origin` is `"paper"` or `"zoo"` (rl-baselines3-zoo), with the
 #'   `source`, or `"ours"`. `tried` is the number of settings that were tried with seeds 1 to 99
 #'   before these were chosen (an integer; `NA` for the zoo's). `vignette("solved")` reports other
@@ -56,7 +56,7 @@ agent_presets <- function(env_id = NULL) {
   }))
 }
 
-# By default those of the agents of this package; "sb3-presets.csv" has those of learn_sb3().
+# Reads the presets of this package's agents, or those of learn_sb3() from "sb3-presets.csv".
 read_presets <- function(name = "agent-presets.csv", env_id = NULL) {
   file <- system.file("extdata", name, package = "gym", mustWork = TRUE)
   presets <- utils::read.csv(file, stringsAsFactors = FALSE)
@@ -71,7 +71,7 @@ read_presets <- function(name = "agent-presets.csv", env_id = NULL) {
   presets
 }
 
-# The preset of an agent for an environment with these arguments, a list, or `NULL`.
+# Returns the preset of an agent for an environment with these arguments, a list, or `NULL`.
 find_preset <- function(agent, env, kwargs, file = "agent-presets.csv") {
   if (!is.character(env)) {
     return(NULL)
@@ -113,12 +113,13 @@ preset_arguments <- function(preset) {
 #' @param make The name of the function that makes the agent.
 #' @param env The user's environment.
 #' @param ... Arguments of `make`, of [train_agent()] and of the environment.
-#' @param defaults Arguments of [train_agent()], for what neither the user nor the preset gives.
+#' @param defaults Arguments of [train_agent()] that are used if neither the user nor the preset
+#'   gives them.
 #' @param frame The frame of the user's call.
 #' @noRd
 make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::caller_env()) {
   match_whole_names(frame)
-  # Before list(...) evaluates an argument that makes something.
+  # Check before list(...) evaluates an argument that may create something.
   check_no_steps(...names(), frame)
   dots <- list(...)
   check_dots_named(dots, "iterations = 100", frame)
@@ -154,8 +155,8 @@ make_and_train <- function(make, env, ..., defaults = list(), frame = rlang::cal
   start_training(arguments, kwargs, client = given$client %||% gym_client(), frame)
 }
 
-# The arguments of an agent, of which the user's replace others. The preset's `top` was meant for
-# another number of directions, or another version.
+# Replaces arguments of an agent by the user's. The preset's `top` does not fit other `directions`
+# or another `version`, nor its `elite` another `population`.
 replace_arguments <- function(arguments, given) {
   if (any(c("directions", "version") %in% names(given))) arguments$top <- NULL
   if ("population" %in% names(given)) arguments$elite <- NULL
@@ -166,9 +167,10 @@ replace_arguments <- function(arguments, given) {
 of_budget <- c("iterations", "total_steps")
 
 #' Complete the arguments of [train_agent()]
-#' @param given Those that the user has given, which replace the preset's; a budget does, too.
-#' @param defaults Those for what neither the user nor the preset gives.
-#' @return All but `...` and `client`, a list.
+#' @param given The arguments that the user has given, which replace the preset's. `iterations`
+#'   replaces the preset's `total_steps`.
+#' @param defaults Arguments that are used if neither the user nor the preset gives them.
+#' @return A list of all arguments but `...` and `client`.
 #' @noRd
 complete_arguments <- function(agent, env, given, preset, defaults = list()) {
   arguments <- as.list(formals(train_agent))
@@ -183,7 +185,7 @@ complete_arguments <- function(agent, env, given, preset, defaults = list()) {
   c(list(agent = agent, env = env), arguments)
 }
 
-# The agent, which keeps for provenance() where its settings are from.
+# Records in the agent where its settings come from, for provenance().
 with_preset <- function(agent, preset, given) {
   if (is.null(preset)) {
     return(agent)
@@ -211,7 +213,7 @@ preset_policy <- function(preset, agent) {
     if (isTRUE(preset$normalize)) policy$moments <- no_moments()
     policy
   } else if (learns_online(agent)) {
-    # A learner makes its own.
+    # A learner makes its own policy.
     NULL
   } else if (is.null(preset$hidden)) {
     policy_linear(bias = preset$bias)
@@ -225,7 +227,7 @@ preset_policy <- function(preset, agent) {
 inform_of_preset <- function(preset, env) {
   origin <- paste0(preset$origin, if (preset$origin == "paper") paste0(": ", preset$source))
   rlang::inform(
-    c(i = paste0("Taking the preset for ", env, " (", origin, "), see `agent_presets(\"", env,
+    c(i = paste0("Using the preset for ", env, " (", origin, "), see `agent_presets(\"", env,
                  "\")`.")),
     class = "gym_message_preset"
   )

@@ -4,13 +4,13 @@
 #' plus the discounted value of the best action in the next state (Watkins 1989; Sutton and Barto
 #' 2018, section 6.5).
 #'
-#' `double = TRUE` keeps two tables. One chooses the best action and the other one values it, which
-#' avoids overestimated values (van Hasselt 2010; section 6.7). `planning` is the number of
-#' remembered steps to learn from after each real one (Dyna-Q; section 8.2). The agent remembers the
-#' last outcome of each state and action.
+#' `double = TRUE` keeps two tables. One table chooses the best action and the other one gives its
+#' value, which avoids overestimated values (van Hasselt 2010; section 6.7). With `planning`, the
+#' agent remembers the last outcome of each state and action, and learns from some of these outcomes
+#' after each step (Dyna-Q; section 8.2).
 #'
 #' For actions of several parts (MultiDiscrete, MultiBinary, and Tuple or Dict of these) the table
-#' has a column for each combination, as in [policy_table()]. The actions that are played have their
+#' has a column for each combination, as in [policy_table()]. The actions that are played have all
 #' parts.
 #'
 #' During learning, the agent draws among actions with equal values. The policy that it returns
@@ -23,15 +23,15 @@
 #' @param discount The discount, a number above 0 and at most 1. The default is 0.99.
 #' @param learning_rate How far a value moves towards its target, a number above 0 and at most 1, or
 #'   a function of the steps so far, such as [schedule_linear()]. With tiles the value moves by this
-#'   share for any number of tiles. With a function as `features` it moves by this share times the
+#'   share for any number of tilings. With a function as `features` it moves by this share times the
 #'   sum of the squared features.
 #' @param epsilon The probability of exploring, a number from 0 to 1, or a function of the steps so
 #'   far.
 #' @param temperature The temperature of softmax exploration, which replaces `epsilon`, a number
 #'   above 0 or a function of the steps so far. `NULL`, the default, for none. See [policy_table()].
 #' @param initial The first value of all actions, a number. The default is 0. A large value makes
-#'   the agent try everything ("optimistic"). With a function as `features` it is the first weight
-#'   of all features, or a number for each.
+#'   the agent try everything ("optimistic"). With a function as `features`, `initial` is the first
+#'   weight of all features, or a number for each.
 #' @param features `NULL`, the default, for a table with a row for each state; the result of
 #'   [tile_coding()]; or a function of a batch of observations that returns a numeric matrix with a
 #'   row of features for each observation.
@@ -40,17 +40,17 @@
 #'   For tables only. The default is 0.
 #' @param bonus A number such as 0.001. Planning adds it, times the square root of k, to the reward
 #'   of an action that was last taken k steps ago (Dyna-Q+; section 8.3). Planning then includes
-#'   actions that were never taken in a visited state, as if they led back to it with no reward. The
-#'   default is 0, for none.
+#'   actions that were never taken in a visited state, as if they led back to this state without a
+#'   reward. The default is 0, for none.
 #' @param mask The name of the element of the environment's info that marks the valid actions, such
 #'   as `"action_mask"` of Taxi: a number for each action (for each combination of its parts), 0 for
 #'   an invalid one. The agent never takes an action again at an observation where it was marked
 #'   invalid, and its value is `-Inf`. For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
-#'   For `learn_q()` also logged steps, as for [learn_fitted_q()]: it then sweeps over all pairs of
-#'   a state and an action that the data has until no value changes (batch Q-learning), and takes
-#'   only `discount`, `double` and `iterations`, the largest number of sweeps.
+#'   `learn_q()` also takes logged steps, as for [learn_fitted_q()]. It then sweeps over all pairs
+#'   of a state and an action in the data until no value changes (batch Q-learning). Its only other
+#'   arguments are then `discount`, `double` and `iterations`, the largest number of sweeps.
 #' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
 #'   `total_steps`, of which one is needed without a preset, `episodes` (in an iteration, 10 by
 #'   default), `target` or `seed`; and of the environment, such as `is_slippery = FALSE`.
@@ -110,12 +110,12 @@ learner_of.gym_agent_q <- function(agent, draw) {
   toward <- learning$store$toward
   discount <- agent$discount
   rate <- agent$learning_rate
-  # A rate that is a number is read once: a call takes a tenth of a step's time.
+  # Read a constant rate only once: a call would take a tenth of a step's time.
   changes <- is.function(rate)
   share <- if (changes) 0 else rate
   taken <- agent$taken
   memory <- if (agent$planning > 0L) new_planning_memory(agent, learning$store)
-  # A step then changes only values of its own state.
+  # If this is TRUE, a step changes only values of its own state.
   own_row <- identical(agent$basis$each, 1L) && is.null(memory)
   new_steps(
     agent, learning,
@@ -204,7 +204,7 @@ new_planning_memory <- function(agent, store) {
       if (bonus > 0) {
         for (other in which(store$row(x) > -Inf)) {
           pair <- x + rows * (other - 1L)
-          # As if it had been tried when training began.
+          # Enter the action as if it had been tried when training began.
           if (is.na(reward[[pair]])) enter(pair, 0, x, FALSE, 0)
         }
       }
@@ -247,7 +247,7 @@ learn_q <- function(env, ...) {
   abort_if(
     length(unfit),
     unfit[[1L]], NULL, call, "From data `learn_q()` has no argument `{unfit[[1L]]}`.",
-    i = "It has `discount`, `double` and `iterations`."
+    i = "It takes `discount`, `double` and `iterations`."
   )
   discount <- given[["discount"]] %||% 0.99
   double <- given[["double"]] %||% FALSE

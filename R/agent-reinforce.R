@@ -8,11 +8,12 @@
 #' The baseline is a value network with the policy's hidden layers. After each iteration it is
 #' fitted to the returns by `value_updates` steps of Adam. Without a baseline the return itself
 #' counts. A truncated episode would have gone on: with a baseline, the value of its last state
-#' replaces the rewards to come. Without one nothing replaces them, and its returns are too low.
+#' replaces the later rewards. Without a baseline nothing replaces them, so they are missing from
+#' its returns.
 #'
-#' Sutton and Barto multiply each step by `gamma^t`, so that late steps count less. This is the
-#' gradient of the discounted return from the start. Like nearly all implementations, this agent
-#' leaves the factor out, because it would hardly learn from the end of an episode.
+#' Sutton and Barto multiply each step by `gamma^t`, so that late steps count less. Only then is it
+#' the gradient of the discounted return from the start. Like nearly all implementations, this agent
+#' leaves out the factor, because with it the agent would hardly learn from the end of an episode.
 #'
 #' Iterations, normalised observations and the default policy are those of [agent_ppo()].
 #'
@@ -28,8 +29,8 @@
 #'   number. The default is 20.
 #' @param entropy The weight of the policy's entropy relative to the return, a number or a function
 #'   of the steps so far. The default is 0.
-#' @param normalize_advantages Scale the factors of the log-probabilities to mean 0 and standard
-#'   deviation 1? `TRUE`, the default, or `FALSE`. The factor of a single step stays as it is.
+#' @param normalize_advantages Scale the advantages (return - baseline) to mean 0 and standard
+#'   deviation 1? `TRUE`, the default, or `FALSE`. The advantage of a single step stays as it is.
 #' @param max_grad_norm The largest length of a gradient, a number, or `Inf`, the default.
 #' @param min_episodes The smallest number of episodes in an iteration. The default is 8.
 #' @inheritParams agent_ars

@@ -13,7 +13,8 @@
 #' @inheritParams agent_q
 #' @param expected Expected Sarsa? `FALSE`, the default, or `TRUE`.
 #' @param n The number of steps to look ahead, a whole number of at least 1, the default.
-#' @param lambda How slowly traces fade, a number from 0, the default, to 1. Only with `n = 1`.
+#' @param lambda How slowly traces fade, a number from 0, the default, to 1. A number above 0
+#'   requires `n = 1`.
 #' @return `agent_sarsa()` returns an agent of class `gym_agent_sarsa`. `learn_sarsa()` makes this
 #'   agent, trains it and returns the result of [train_agent()].
 #' @inheritSection agent_q Errors
@@ -75,7 +76,7 @@ learner_of.gym_agent_sarsa <- function(agent, draw) {
   )
 }
 
-# The mean of the values over the next actions.
+# Returns the mean value of the next actions, weighted by their probabilities.
 expected_value <- function(agent, values, taken) {
   values <- matrix(values, 1L)
   exploring <- list(

@@ -1,9 +1,9 @@
-# Settings of a learner that change with the number of steps it has taken.
+# Settings of an agent that change with the number of steps that it has taken.
 
 #' Change a number while an agent learns
 #'
-#' Make a schedule for a learner's `epsilon`, `learning_rate` or `temperature`: a function of the
-#' number of steps observed so far. Any such function works; these are the usual ones.
+#' Make a schedule for an agent's `epsilon`, `learning_rate` or `temperature`: a function of the
+#' number of steps so far. You can also write such a function yourself.
 #'
 #' @param from,to The value in the first step, and the value after `duration` steps, where it stays.
 #' @param duration The number of steps from `from` to `to`, a number of at least 1.
@@ -53,9 +53,9 @@ print.gym_schedule <- function(x, ...) {
                         ">"))
 }
 
-# Inside of learners ------------------------------------------------------------------------
+# Use in agents -----------------------------------------------------------------------------
 
-# Below this, a softmax takes the best action.
+# At this temperature a softmax takes the best action. Lower ones are refused.
 lowest_temperature <- 1e-12
 
 check_schedules <- function(settings, names, min = 0, max = Inf, call = rlang::caller_env()) {
@@ -73,7 +73,7 @@ check_schedules <- function(settings, names, min = 0, max = Inf, call = rlang::c
   }
 }
 
-# The number 0 is a choice; a schedule that is always 0 is a mistake.
+# A user may choose the number 0. But a schedule that is always 0 is a mistake.
 check_explores <- function(epsilon, call) {
   is_zero <- function(taken) isTRUE(tryCatch(epsilon(taken) == 0, error = function(cnd) FALSE))
   if (is.function(epsilon) && all(vapply(c(0, 10^(0:8)), is_zero, NA))) {

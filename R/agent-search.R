@@ -1,12 +1,12 @@
-# The agent of the tutorial: weights at random.
+# Agents that search for weights: at random, by hill climbing, and by the cross-entropy method.
 
 #' Draw weights at random
 #'
 #' Draw new weights for each candidate, as [policy_network()] draws them, and keep the best so far,
-#' as the tutorial *Artificial Intelligence in R (I)* (2018) does. Nothing is learned from one
-#' iteration for the next. This makes it the baseline for other agents. [search_random()] trains
-#' this agent by the tutorial's own rule, `train_agent(solved_by = "candidate")`. Otherwise it is
-#' trained and evaluated like the others.
+#' as the tutorial *Artificial Intelligence in R (I)* (2018) does. It learns nothing from one
+#' iteration for the next, so it is a baseline for other agents. [search_random()] trains this agent
+#' by the tutorial's own rule, `train_agent(solved_by = "candidate")`. [train_agent()] without this
+#' argument trains and evaluates it like other agents.
 #'
 #' @param candidates The number of candidates per iteration, a whole number of at least 1. The
 #'   default is 8. By the tutorial's rule each candidate is an iteration.
@@ -64,9 +64,9 @@ format.gym_agent_random <- function(x, ...) {
 #' Train [agent_random()], the agent of the tutorial *Artificial Intelligence in R (I)* (2018), by
 #' the tutorial's rule. Each round draws new weights for a network and plays a batch of episodes
 #' with it. The first round whose mean return reaches the target ends the search. `search_random()`
-#' without arguments solves CartPole. It is [train_agent()] with other defaults and
-#' `solved_by = "candidate"`. An environment given by its id is made for the search and always
-#' closed afterwards.
+#' without arguments solves CartPole. It is [train_agent()] with other defaults and `solved_by =
+#' "candidate"`. If you give an environment by its id, the search makes it and closes it afterwards,
+#' also after an error.
 #'
 #' One whole number, `seed`, determines the weights of each round and the seeds of its episodes.
 #' Without a seed, one is drawn from R's generator, so [set.seed()] fixes the whole search, too.
@@ -104,8 +104,9 @@ format.gym_agent_random <- function(x, ...) {
 #'   a message of class `gym_message_resumed`, and starts otherwise. A finished search is returned
 #'   at once. `FALSE` starts again and replaces the file.
 #' @param seeds `NULL`, the default, or different whole numbers to search once with each. One search
-#'   says little about how long searches take. All are returned, an object of class [gym_trainings],
-#'   and `plot()` shows how many rounds they needed. Each is the same as `search_random(seed = )`.
+#'   says little about how long searches take. The result is an object of class [gym_trainings] with
+#'   all of them, and `plot()` shows how many rounds they needed. Each search is the same as that of
+#'   `search_random(seed = )`.
 #' @return An object of class [gym_search], with methods for [print()],
 #'   [summary()][summary.gym_search()], [plot()][plot.gym_search()],
 #'   [as.data.frame()][as.data.frame.gym_search()] and [predict()]. It is also a `gym_training`, see
@@ -123,8 +124,8 @@ format.gym_agent_random <- function(x, ...) {
 #'   `truncated` (logical).}
 #'   \item{target}{The target, a double, or `NULL`.}
 #'   \item{env_id, env}{The environment's id, a string, and the environment as given.}
-#'   \item{num_envs}{The number of sub-environments, an integer. If they share the seed of an
-#'   episode, [rollout()] explains how to start one again.}
+#'   \item{num_envs}{The number of sub-environments, an integer. If they share one seed, [rollout()]
+#'   explains how to repeat an episode.}
 #'   \item{client}{The client of the environment.}
 #'   \item{template, max_rounds, max_steps}{`policy`, `rounds` and `max_steps` as given.}
 #'   \item{seed}{The seed, as given or drawn. The same call with this seed gives the same search.}
@@ -175,8 +176,8 @@ search_random <- function(env = "CartPole-v0", policy = policy_network(), rounds
 #' Hill climbing
 #'
 #' Add uniform noise from `-noise` to `noise` to the best weights so far, and keep the result if it
-#' does better. The search gets stuck if the best weights were lucky, or if all weights nearby do
-#' equally badly.
+#' does better. The search gets stuck if the best weights were lucky, or if all weights nearby are
+#' equally bad.
 #'
 #' @param noise The largest distance of a candidate from the best weights, in each weight, a number
 #'   above 0.

@@ -5,20 +5,20 @@
 #' Train each setting with each seed, on the workers of the plan ([workers]) if there is one, and
 #' compare the settings as in [compare_trainings()]. A run that fails does not stop the others.
 #'
-#' The best of many settings was also lucky, and more so the more you try, so the results of its
-#' seeds are too good. `report_seeds`, which must be different, train it once more. Report their
-#' results.
+#' The best of many settings was also lucky, and more so the more settings you try. So its results
+#' with `seeds` are too good. With `report_seeds`, which must be other seeds, it is trained once
+#' more. Report those results.
 #'
 #' The best setting is the one with the highest interquartile mean. If trainings stop at a target,
-#' it is the one with which most runs reached it, or, of equal ones, the one with the smallest
-#' median of steps; there is none if no run reached it, or if several are equal.
+#' it is the setting with which most runs reached the target. If several have the same number, the
+#' smallest median of steps decides. There is no best setting if no run reached the target, or if
+#' several settings are equal.
 #'
-#' Where `agent` is one of this package's and the environment has a preset for it
-#' ([agent_presets()]), `settings` replace its values: the sweep tunes the agent, and the policy,
-#' that [learn_ppo()] and others would train. A message says so.
+#' If the environment has a preset for `agent` ([agent_presets()]), the sweep starts from the
+#' preset, as [learn_ppo()] and the like do, and `settings` replace its values. A message says so.
 #'
 #' With `folder` each run is kept in a file. After an interrupt, a crash or an error, the same call
-#' resumes with the missing runs. You may add settings.
+#' resumes with the missing runs. You may add settings to this call.
 #'
 #' @param agent The function that makes the agent, such as [agent_ars], without parentheses, or your
 #'   own.
@@ -159,7 +159,7 @@ check_sweep <- function(agent, settings, seeds, report_seeds, folder, call) {
     abort_if(
       length(both), "report_seeds", report_seeds, call,
       "Seed {both[[1L]]} is one of `seeds` and of `report_seeds`.",
-      i = "What is reported must come from seeds that chose nothing."
+      i = "Report seeds that were not used to choose the setting."
     )
   }
 }
@@ -235,7 +235,7 @@ best_settings <- function(comparison) {
     table <- table[table$statistic == "iqm", ]
     return(table$training[which(table$value == max(table$value, -Inf, na.rm = TRUE))])
   }
-  # A median that fewer than half have reached is NA.
+  # If fewer than half of the runs have reached the target, the median is NA.
   median <- ifelse(is.na(table$median), Inf, table$median)
   share <- table$reached / table$runs
   first <- order(-share, median)[[1L]]
@@ -277,7 +277,7 @@ print.gym_sweep <- function(x, ...) {
   failed <- x$runs[!is.na(x$runs$error), ]
   print_lines(x, c(
     paste0("Sweep of ", count_of(nrow(x$settings), "setting"),
-           if (x$interrupted) ", interrupted: the same call goes on where it has a folder"),
+           if (x$interrupted) ", interrupted: with a `folder` the same call goes on"),
     paste0("Tuning seeds: ", numbers_text(x$seeds),
            if (!is.null(x$best)) ", which chose the setting"),
     if (!is.null(x$comparison)) comparison_lines(x$comparison, pairs = FALSE),
@@ -295,7 +295,7 @@ print.gym_sweep <- function(x, ...) {
   ))
 }
 
-# "1 to 5", or all of them.
+# "1 to 5" for seeds in a row, otherwise all of them.
 numbers_text <- function(x) {
   row <- length(x) > 2L && all(diff(x) == 1)
   if (row) paste(x[[1L]], "to", x[[length(x)]]) else paste(x, collapse = ", ")

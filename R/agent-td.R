@@ -10,9 +10,9 @@
 #' @param initial The first value of all states, a number. The default is 0. With a function as
 #'   `features` it is the first weight of all features, or a number for each.
 #' @param behavior Another policy, which plays instead of `policy`. Each step is then weighted by
-#'   how much more likely `policy` is to take its action (off-policy learning by importance
-#'   sampling; sections 5.5 and 11.1). The probabilities of both must be known: use a
-#'   [policy_table()] or a [policy_random()]. `NULL`, the default, for none.
+#'   the probability of its action under `policy`, divided by that under `behavior` (off-policy
+#'   learning by importance sampling; sections 5.5 and 11.1). The probabilities of both must be
+#'   known: use a [policy_table()] or a [policy_random()]. `NULL`, the default, for none.
 #' @param ... Arguments of the agent, as above; of [train_agent()], such as `iterations` or
 #'   `total_steps`, of which one is needed, `episodes` (in an iteration, 10 by default) or `seed`;
 #'   and of the environment. By default there is no `target`, because learning values does not
@@ -38,7 +38,7 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   check_one_policy(policy, "policy", call)
   check_count(n)
   check_number(lambda, min = 0, max = 1)
-  # The probabilities of both must be known, and only one step ahead is weighted.
+  # Importance sampling needs the probabilities of both policies, and weights a single step.
   for (arg in if (!is.null(behavior)) c("policy", "behavior")) {
     if (!inherits(get(arg), c("gym_policy_table", "gym_policy_random"))) {
       must <- "a table or a random policy, whose probabilities are known"
@@ -47,7 +47,7 @@ agent_td <- function(policy, discount = 0.99, learning_rate = 0.1, initial = 0, 
   }
   abort_if(
     !is.null(behavior) && (n > 1 || lambda > 0),
-    "behavior", behavior, call, "`behavior` is for one step: leave out `n` and `lambda`."
+    "behavior", behavior, call, "`behavior` works with one step only: leave out `n` and `lambda`."
   )
   settings <- list(
     plays = behavior %||% policy, learns = if (!is.null(behavior)) policy, discount = discount,
@@ -101,8 +101,8 @@ learner_of.gym_agent_td <- function(agent, draw) {
   )
 }
 
-# How much more likely `policy` takes an action than the policy that plays: a function of an
-# observation (a batch of one) and the number of an action.
+# Makes a function of an observation (a batch of one) and the number of an action. It returns the
+# probability of the action under `policy`, divided by that under the policy that plays.
 importance_ratio <- function(agent) {
   index <- table_index(agent$spaces$observation_space, "observations", NULL)$index
   target <- chooser_probabilities(agent$learns, agent$spaces$action_space, by_state = TRUE)
@@ -120,7 +120,7 @@ importance_ratio <- function(agent) {
 #' Make the function by which a given policy acts, one observation at a time
 #'
 #' For a table or a random policy the probabilities of the actions are known in advance. Any other
-#' policy is asked; with several sub-environments it was asked about all of them together.
+#' policy is asked in each step.
 #' @noRd
 policy_chooser <- function(agent, probabilities, draw) {
   space <- agent$spaces$action_space
@@ -137,8 +137,8 @@ policy_chooser <- function(agent, probabilities, draw) {
   }
 }
 
-# The probability of each action: a matrix with a row for each state, a vector if it does not depend
-# on the state, `NULL` if it is not known in advance.
+# Returns the probability of each action: a matrix with a row for each state, a vector if it does
+# not depend on the state, or `NULL` if it is not known in advance.
 chooser_probabilities <- function(policy, action_space, by_state) {
   if (inherits(policy, "gym_policy_table") && by_state) {
     table_probabilities(policy)

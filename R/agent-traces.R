@@ -2,7 +2,7 @@
 
 #' Make the function that moves a value towards its target
 #' @return A function of `x` and `column`, whose value moves; `reward`; `ahead`, the value of the
-#'   next state, 0 at the end of an episode; `ended`; `sub_env`; and `taken`, the steps so far.
+#'   next state, 0 if the episode terminated; `ended`; `sub_env`; and `taken`, the steps so far.
 #' @noRd
 lookahead <- function(agent, store) {
   rate <- rate_of(agent$learning_rate)
@@ -28,10 +28,11 @@ for_each_sub_env <- function(make) {
   }
 }
 
-# Traces that have faded from 1 to less than this are dropped: a hundred millionth of an error.
+# Traces smaller than this are dropped. They would move a weight by a hundred millionth of the
+# error.
 least_trace <- 1e-8
 
-#' Remember the weights that were used, and move all of them
+#' Remember which weights were used, and move all of them
 #'
 #' Traces are replacing for tables and tiles, and accumulating for a user's features (Sutton and
 #' Barto 2018, sections 12.2 and 12.7).
@@ -56,7 +57,7 @@ new_trace <- function(store, decay, replacing, sparse = replacing) {
       strength[active] <<- faded
       before <- strength[cells]
       before[is.na(before)] <- 0
-      # A row of zeros, or a state with a single action, uses no weight.
+      # `cells` is empty if all features are 0, or if the state has a single action.
       if (length(strength) < max(0, cells)) {
         strength <<- c(strength, numeric(length(store$get()) - length(strength)))
       }
@@ -108,7 +109,7 @@ n_step_lookahead <- function(agent, store, rate) {
       columns[[count]] <<- column
       rewards[[count]] <<- reward
       if (ended) {
-        # At the end of an episode all remaining steps have their targets.
+        # At the end of an episode the targets of all remaining steps are known.
         while (length(rewards)) learn_first(ahead, rate)
       } else if (count == n) {
         learn_first(ahead, rate)

@@ -25,14 +25,14 @@ check_learner <- function(settings, call = rlang::caller_env()) {
   }
   features <- settings$features
   initial <- plain_numbers(settings$initial, "initial", call)
-  # With a function as `features` it may be a number for each feature.
+  # With a function as `features`, `initial` may have a number for each feature.
   if (!is.function(features) || length(initial) <= 1L) {
     check_number(initial, arg = "initial", call = call)
   } else if (!is.numeric(initial) || !all(is.finite(initial))) {
     abort_argument(initial, "finite numbers", "initial", call)
   }
   if (!is.null(features) && !is.function(features) && !inherits(features, "gym_features")) {
-    must <- "NULL, what `tile_coding()` makes, or a function of observations"
+    must <- "NULL, the result of `tile_coding()`, or a function of observations"
     abort_argument(features, must, "features", call)
   }
   check_string(settings$mask, arg = "mask", allow_null = TRUE, call = call)
@@ -69,7 +69,7 @@ first_weights <- function(agent, policy) {
     )
     weights <- policy$q
   } else if (is.na(agent$basis$count)) {
-    # The user's function has not been called yet.
+    # The number of features is unknown until the user's function is called.
     return(NULL)
   } else {
     rows <- agent$basis$count
@@ -93,8 +93,8 @@ first_weights <- function(agent, policy) {
 
 #' Make the functions that all learners of values share
 #'
-#' They are closures over plain numbers, for one step at a time. An element of a vector is changed
-#' in place; an agent that is passed from step to step would be copied.
+#' They are closures, which change elements of vectors in place. An agent that is passed from step
+#' to step would be copied each time.
 #' @return A list: `store`, see [value_store()]; `choose`, see [action_chooser()]; `learn`, see
 #'   [lookahead()].
 #' @noRd
@@ -105,9 +105,9 @@ learning_of <- function(agent, draw) {
 
 #' Make a learner from the functions of its steps
 #' @param learning As [learning_of()] makes it.
-#' @param act,observe,sees The learner's own, as [learner_of()] describes them.
-#' @param keeps A function that returns what the agent keeps besides its weights, a list with names:
-#'   the number of steps so far, `taken`, and the learner's own elements.
+#' @param act,observe,sees As [learner_of()] describes them.
+#' @param keeps A function that returns the elements that the agent keeps besides its weights, a
+#'   list with names: the number of steps so far, `taken`, and others.
 #' @param stores All its tables; the first one has the values of the actions.
 #' @noRd
 new_steps <- function(agent, learning, act, observe, keeps, stores = list(learning$store),
@@ -206,7 +206,7 @@ feature_store <- function(weights, initial, columns) {
 
 #' Make the function by which a learner chooses an action
 #'
-#' It draws among equal values, so that a new learner explores everything.
+#' If values are equal, it draws one of them, so that a new learner tries all actions.
 #' @param draw Draws a number from 0 to 1.
 #' @return A function of the values of the actions and the steps so far, which returns the number of
 #'   an action, from 1.
@@ -245,12 +245,12 @@ action_chooser <- function(agent, draw) {
   }
 }
 
-# Draws a place with a probability proportional to its weight; `u` is a random number from 0 to 1.
+# Draws a place with a probability proportional to its weight. `u` is a random number from 0 to 1.
 draw_place <- function(weight, u) {
   until <- cumsum(weight)
   count <- length(until)
   place <- sum(until <= u * until[[count]]) + 1L
-  # By rounding the number may lie beyond the last place.
+  # Because of rounding, the place may be one too large.
   if (place > count) max(which(weight > 0)) else place
 }
 
@@ -291,8 +291,8 @@ weights_policy <- function(agent, columns) {
 #'   under its name, and `value`. A rule from data has a data frame of the states of the data, with
 #'   the column `step` if it has a horizon. With `actions = TRUE` a data frame with a row for each
 #'   state and action: the column `state`, or one for each part, `action` (its number), or one for
-#'   each part, such as `action_dose`, and `value`.
-#'   States that were never left, such as terminal ones, keep their first value.
+#'   each part, such as `action_dose`, and `value`. States in which no action was taken, such as
+#'   terminal ones, keep their first value.
 #' @section Errors: `gym_error_argument` if `x` was not learned by a table or by features of
 #'   Discrete observations.
 #' @export
@@ -330,7 +330,7 @@ state_values <- function(x, actions = FALSE) {
       row.names = NULL
     ))
   }
-  # Under a given policy, the mean over its actions.
+  # For a given policy, the value of a state is the mean over the policy's actions.
   values <- if (is.null(agent$learns) || ncol(q) == 1L) {
     row_max(q)
   } else {

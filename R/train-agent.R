@@ -10,23 +10,23 @@
 #' Before the first iteration and then every `eval_every` iterations, the agent's own policy plays
 #' `eval_episodes_curve` episodes for the learning curve. If their mean return, or that of the
 #' iteration's episodes, reaches the target, the policy plays `eval_episodes` new episodes, which
-#' decide whether training ends. (The iterations of [agent_dqn()] are single episodes; the mean of
-#' the last eight counts.) This may happen several times, so training tends to end when the policy
-#' was lucky. At the end the policy therefore plays `eval_episodes` further episodes, with seeds
-#' that were never used before. Their mean return is the result of the training. Evaluations do not
-#' count as steps of the training.
+#' decide whether training ends. ([agent_dqn()] plays single episodes; the mean of its last eight
+#' counts.) This may happen several times, so training tends to end when the policy was lucky. At
+#' the end the policy therefore plays `eval_episodes` further episodes, with seeds that were never
+#' used before. Their mean return is the result of the training. Evaluations do not count as steps
+#' of the training.
 #'
-#' Without a step limit, by the environment or `max_steps`, the policy is not evaluated before the
-#' first iteration: an untrained policy might never end an episode. Later evaluations then cut off
-#' an episode after ten times the mean length of an iteration's episodes, of the longest so far, but
-#' not before 1,000 steps. A message says when this happens.
+#' If neither the environment nor `max_steps` limits the steps of an episode, the policy is not
+#' evaluated before the first iteration: an untrained policy might never end an episode. Later
+#' evaluations then cut off each episode after 1,000 steps, or after ten times the mean length of
+#' the iteration with the longest episodes, if that is more. A message says when this happens.
 #'
 #' If the model of the environment is known ([env_model()]), a learner's policy is evaluated
 #' exactly, without playing. These evaluations have 0 episodes and a standard error of 0. In a large
-#' model they take time. There, a minimum number of training steps lies between two of them, even if
-#' `eval_every` is smaller, so that they take about a tenth of the time. This number depends only on
-#' the number of states and on the step limit. It is printed, and is `eval_steps` in the training's
-#' `rules`.
+#' model an exact evaluation takes time. There, at least a certain number of training steps lies
+#' between two evaluations, even if `eval_every` asks for more, so that they take about a tenth of
+#' the time. This number depends only on the number of states and on the step limit. It is printed,
+#' and it is `eval_steps` in the training's `rules`.
 #'
 #' # Targets
 #'
@@ -40,37 +40,37 @@
 #' | `"Pendulum-v1"` | -200 | ours; none is registered |
 #' | `"Swimmer-v5"` | 325 | Mania, Guy and Recht (2018); registered: 360 |
 #'
-#' Training tends to stop when the policy was lucky. A target somewhat above the environment's makes
-#' it more likely that the final evaluation reaches the environment's. Use the same target for
-#' trainings that you compare.
+#' Training tends to stop when the policy was lucky. If you set a target somewhat above the
+#' environment's, the final evaluation is more likely to reach the environment's. Use the same
+#' target for trainings that you compare.
 #'
 #' # Sampling from a model
 #'
-#' FrozenLake, CliffWalking and Taxi have a model. A learner of one of them, given by its id, gets
-#' the model from the server once and samples from it in R, which is many times faster and has the
-#' same distribution. A message says so. It plays on the server with `model = FALSE`, with `mask`,
-#' `callback`, `num_workers`, wrappers or a `render_mode`, on a lake with a random map, and in a
-#' Taxi with a fickle passenger. A model without a step limit, such as CliffWalking's, requires
-#' `max_steps`.
+#' FrozenLake, CliffWalking and Taxi have a model. If you give one of them by its id, a learner gets
+#' the model from the server once and samples from it in R. This is many times faster, and the
+#' distribution of episodes is the same. A message says so. The learner still plays on the server
+#' with `model = FALSE`, with `mask`, `callback`, `num_workers`, wrappers or a `render_mode`, on a
+#' lake with a random map, and in a Taxi with a fickle passenger. A model without a step limit, such
+#' as CliffWalking's, requires `max_steps`.
 #'
 #' # Resuming
 #'
-#' `checkpoint` keeps the training in a file. It is written after each iteration, or less often if
-#' iterations are short, so that it takes at most a tenth of the time. The same call resumes the
-#' training, with the same result as an uninterrupted one. A finished training is returned at once.
-#' `iterations`, `total_steps` and `target` may differ, except in a search: a larger budget or a
-#' higher target goes on with a finished training. (A network with given sizes draws its weights
-#' when it is made: make it after [set.seed()], or with the sizes `NA`.) `readRDS()` of the file
-#' prints what it is.
+#' `checkpoint` keeps the training in a file. The file is written after each iteration, or less
+#' often if iterations are short, so that writing takes at most a tenth of the time. The same call
+#' resumes the training, with the same result as an uninterrupted one. A finished training is
+#' returned at once. `iterations`, `total_steps` and `target` may differ, except in a search: with a
+#' larger budget or a higher target, a finished training goes on. (A network whose sizes you give
+#' draws its weights when you make it. To make the same one again, call [set.seed()] first, or leave
+#' the sizes `NA`.) To see which training a file has, print the result of `readRDS()`.
 #'
 #' # Going on with a trained agent
 #'
 #' `train_agent(training$agent, env)` goes on with the agent of an earlier training: its policy,
 #' value network, optimiser, memory and schedules stay as they were. So does `policy = training` in
-#' the function that made this agent, such as [learn_ppo()]. It keeps the agent's settings, except
-#' those that you give, and has the same budget once more by default. It is a new training, with its
-#' own seed, steps and evaluations. `policy = agent_policy(training$agent)` starts with the policy
-#' alone.
+#' the function that made this agent, such as [learn_ppo()]. This function keeps the agent's
+#' settings, except those that you give, and uses the same budget again by default. Both calls are
+#' new trainings, with their own seeds, steps and evaluations. `policy =
+#' agent_policy(training$agent)` starts with the policy alone.
 #'
 #' # The tutorial's rule
 #'
@@ -87,8 +87,8 @@
 #' @param env The environment, as for [rollout()].
 #' @param policy The policy to train: a network, by default [policy_linear()] or the one named on
 #'   the agent's help page. Most agents start with its weights. A learner such as [agent_q()] makes
-#'   its own policy, and can start with a [policy_table()] of values. Give an earlier training to
-#'   go on with its agent, or, by another kind of agent, to start with its policy.
+#'   its own policy, and can start with a [policy_table()] of values. Give an earlier training to go
+#'   on with its agent. If `agent` is of another kind, it starts with that training's policy.
 #' @param iterations,total_steps The number of iterations, or of steps of the environment, after
 #'   which training ends, whole numbers of at least 1. The last iteration is played to its end. Give
 #'   at least one of the two.
@@ -132,7 +132,7 @@
 #' @param resume Resume from the file if it exists? `TRUE`, the default, or `FALSE`, which starts
 #'   again and replaces it.
 #' @param progress Show a progress bar? By default in interactive sessions only. Without one, a
-#'   training with more than a minute to go says after a few seconds how long it may take.
+#'   message after a few seconds says how long the training may take, if more than a minute is left.
 #' @param num_envs,num_workers The number of sub-environments, and of processes that run them, as
 #'   for [rollout()]. A learner plays in one sub-environment by default, see [agent_observe()].
 #' @param model Let a learner sample from the model in R, if the environment is given by its id and
@@ -144,8 +144,9 @@
 #'   [provenance()]; with `seeds`, one of class [gym_trainings]. A training is a list with the
 #'   elements
 #'   \describe{
-#'     \item{policy}{The agent's policy with its final weights, as it was evaluated.
-#'       `agent_policy(training$agent)` draws its actions if the agent's policy does.}
+#'     \item{policy}{The agent's policy with its final weights, as it was evaluated. By default it
+#'       takes the most likely actions; `agent_policy(training$agent)` draws them if the agent's
+#'       policy does.}
 #'     \item{agent}{The agent at the end.}
 #'     \item{solved}{Whether the final evaluation, or a round by the tutorial's rule, has reached
 #'       the target, a logical. `NA` without a target, and with `target = Inf`.}
@@ -258,7 +259,7 @@ training_settings <- function(given, kwargs, client, call) {
   settings["eval_steps"] <- list(
     if (!is.null(settings$model)) steps_between_evaluations(settings$model, settings$max_steps)
   )
-  # `learn_q("Taxi-v4")` is `learn_q(env_model("Taxi-v4"))`.
+  # `learn_q("Taxi-v4")` plays in the model, as `learn_q(env_model("Taxi-v4"))` does.
   sampled <- sampled_model(settings, wants_random_map(env, kwargs), call)
   settings$from_model <- !is.null(sampled)
   settings$played <- if (is.null(sampled)) settings[c("env", "kwargs")] else list(env = sampled)
@@ -281,7 +282,7 @@ with_training_env <- function(settings, play, client, call, max_steps = settings
   play_both <- function(vector_env) {
     if (isTRUE(given_id(played$env)$calls_r) && learns_online(settings$agent) &&
           vector_env$num_envs == 1L) {
-      # The learner plays in one sub-environment, its evaluations may play in many.
+      # The learner plays in one sub-environment, but its evaluations may play in many.
       vector_env$make_evaluated <- function() {
         if (is.null(evaluated)) {
           evaluated <<- rlang::exec(
@@ -313,7 +314,7 @@ iteration_candidates <- function(agent) {
   )
 }
 
-# Adds to the settings of one training its seed and `file`, the result of open_checkpoint().
+# Adds two settings of a single training: its seed, and `file`, the result of open_checkpoint().
 with_checkpoint <- function(settings, call) {
   if (!is.null(settings$checkpoint)) {
     settings$file <- open_checkpoint(
@@ -371,8 +372,8 @@ train_in <- function(vector_env, settings, progress, call) {
   run_training(state, vector_env, settings, progress, call)
 }
 
-# Weights that are drawn when the environment's sizes become known depend on the training's seed, so
-# a policy that draws them is drawn again.
+# A network with sizes that are `NA` draws its weights when it is bound to an environment. These
+# weights must depend on the training's seed, so the network gets a seed that is drawn from it.
 bind_with_seed <- function(policy, vector_env, seed, call) {
   if (!is.null(policy$weights_seed)) {
     # Its own stream: the agent's first random numbers must not equal the weights.

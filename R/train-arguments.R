@@ -33,12 +33,12 @@ check_training <- function(settings, call) {
     abort_argument(settings$callback, "a function of a training, or NULL", "callback", call)
   }
   if (settings$search && !inherits(settings$agent, "gym_agent_random")) {
-    must <- "\"evaluation\" for this agent: only the policy of `agent_random()` is a candidate's"
+    must <- "\"evaluation\" for this agent: only `agent_random()` can be judged by its candidates"
     abort_argument("candidate", must, "solved_by", call)
   }
 }
 
-# Otherwise `steps` would be taken for an argument of the environment.
+# Without this error `steps` would be taken for an argument of the environment.
 check_no_steps <- function(names, call) {
   abort_if(
     "steps" %in% names, "steps", NULL, call,
@@ -47,7 +47,7 @@ check_no_steps <- function(names, call) {
   )
 }
 
-# Otherwise an argument of the agent, too, would be taken for one of the environment.
+# Without this error an argument of the agent would be taken for one of the environment.
 check_not_of_agent <- function(names, of_agent, place, call) {
   own <- intersect(names, of_agent)
   abort_if(
@@ -57,8 +57,9 @@ check_not_of_agent <- function(names, of_agent, place, call) {
   )
 }
 
-# A misspelt argument would be taken for one of the environment. A name that only resembles another
-# may really be one: it is refused only if training cannot start anyway.
+# A misspelt argument would be taken for one of the environment. But a name that only resembles an
+# argument may really be one of the environment, so it is an error only if training cannot start
+# anyway.
 check_spelling <- function(names, choices, can_begin, call) {
   check_no_steps(names, call)
   for (name in names) {
@@ -71,8 +72,8 @@ check_spelling <- function(names, choices, can_begin, call) {
   }
 }
 
-# The names are of arguments that train_agent() does not know: of the agent, misspelt, or really of
-# the environment.
+# `names` are those of arguments that train_agent() does not have. They may belong to the agent or
+# to the environment, or be misspelt.
 abort_no_budget <- function(names, agent, presets, call) {
   of_agent <- unlist(lapply(names, nearest_name, names(agent)))
   abort_wrong(
@@ -88,7 +89,8 @@ abort_no_budget <- function(names, agent, presets, call) {
   )
 }
 
-# A learner explores, so it reaches all states of a model. With a given policy it may not.
+# A learner explores, so it may reach any state of the model. agent_td() plays a given policy, which
+# may never reach a state without an end.
 check_training_ends <- function(vector_env, settings, online, call) {
   check_has_end(vector_env, settings$max_steps %||% Inf)
   model <- settings$model

@@ -3,10 +3,10 @@
 #' An agent finds the weights of a policy. It is a plain list with its own class before
 #' `"gym_agent"`, made by a function such as [agent_ars()]. Training calls only these generics. Each
 #' returns a value and changes nothing else, so an agent can be saved and resumed. Draw random
-#' numbers from R's generator, which training sets.
+#' numbers with R's functions, such as `rnorm()`: training sets R's generator.
 #'
 #' An iteration is: ask, play each candidate, tell. An agent that follows a gradient has one
-#' candidate, its behavior policy, and needs the trajectories. It climbs
+#' candidate, its behavior policy, and needs the trajectories. It moves the weights along
 #' [policy_log_prob_gradient()].
 #'
 #' @param agent The agent.
@@ -40,9 +40,10 @@
 #'   `"moments"` if its policy has `normalize = TRUE`.
 #' * `agent_policy()`: the policy with the agent's current weights, which need not be those of the
 #'   best candidate. The method of `"gym_agent"` returns `agent$policy`.
-#' * `agent_behavior()`: the policy whose candidates are played; a method may draw it. The method of
-#'   `"gym_agent"` returns `agent_policy(agent)`. If it is not a network (a [policy_random()], for
-#'   example), it is played itself, and `agent_ask()` is not called.
+#' * `agent_behavior()`: the policy whose candidates are played; a method may draw random numbers to
+#'   choose it. The method of `"gym_agent"` returns `agent_policy(agent)`. If this policy is not a
+#'   network (a [policy_random()], for example), it is played as it is, and `agent_ask()` is not
+#'   called.
 #' * `agent_episodes()`: the number of episodes of each candidate in this iteration. The method of
 #'   `"gym_agent"` returns `episodes`, the argument of [train_agent()].
 #' * `agent_log()`: numbers about the last iteration for the history and the log, a numeric vector
@@ -50,7 +51,7 @@
 #' @param episodes The argument `episodes` of [train_agent()].
 #' @export
 #' @examples
-#' # Steps in a random direction, kept where they are no worse.
+#' # Take a step in a random direction, and keep it if the return is no worse.
 #' agent_walk <- function(size = 0.1) {
 #'   structure(list(size = size, best = -Inf), class = c("walk", "gym_agent"))
 #' }
@@ -136,7 +137,7 @@ default_policy <- function(agent) UseMethod("default_policy")
 #' @exportS3Method
 default_policy.gym_agent <- function(agent) policy_linear()
 
-# Makes an agent of this package. `shared` are the classes of what it shares with others.
+# Makes an agent of this package. `shared` are classes with methods that several agents share.
 new_agent <- function(class, settings, shared = NULL) {
   structure(settings, class = c(paste0("gym_agent_", class), shared, "gym_agent"))
 }

@@ -27,7 +27,7 @@ read_checkpoint <- function(path, call) {
     abort_checkpoint(path, "is damaged", "Its content does not match its hash.", call)
   }
   saved <- unserialize(file$state)
-  # Earlier versions kept a memory in files of its own.
+  # Earlier versions wrote a memory to separate files.
   if (!is.null(saved$training$agent$memory$room)) {
     abort_checkpoint(path, "keeps its memory in other files, which this version cannot read",
                      call = call)
@@ -36,7 +36,7 @@ read_checkpoint <- function(path, call) {
 }
 
 write_checkpoint <- function(path, state) {
-  # In the machine's own order of bytes this takes half the time.
+  # The machine's own byte order takes half the time.
   state <- serialize(state, NULL, xdr = FALSE)
   file <- structure(
     list(
@@ -158,16 +158,16 @@ checkpoint_writer <- function(checkpoint, state, what, call) {
 # These values change when another process replaces a file.
 file_mark <- function(path) as.list(file.info(path)[c("size", "mtime", "ctime")])
 
-# Whether another process has written the file meanwhile and its version must be kept. Returns a
-# description of the owner, or NULL if our version may replace it.
+# Checks whether another process has written a file that must be kept. Returns a text that says
+# whose file it is, or NULL if our version may replace it.
 overtaken_by <- function(path, own, what) {
   there <- tryCatch(read_checkpoint(path, NULL), error = function(cnd) NULL)
   if (is.null(there)) {
     NULL
   } else if (!is_same(there$what, own$what) || !is_same(there$arguments, own$arguments)) {
-    paste("is now that of another", what)
+    paste("now belongs to another", what)
   } else if (there$training$steps > own$training$steps) {
-    paste("is that of the same", what, "in another process, which is ahead")
+    paste("belongs to the same", what, "in another process, which is ahead")
   }
 }
 

@@ -22,8 +22,8 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
     folder <- paste0("`dir.create(\"", dirname(path), "\")` makes the folder.")
     abort_checkpoint(path, "is in a folder that does not exist", hint = folder, call = call)
   }
-  # A process that was killed while writing has left parts. Another one may still be writing what is
-  # younger than ten minutes.
+  # A process that was killed while writing leaves a part behind. Another process may still be
+  # writing a part that is younger than ten minutes.
   files <- list.files(dirname(path), "[.]part$", full.names = TRUE)
   parts <- files[startsWith(basename(files), paste0(basename(path), "-"))]
   unlink(parts[difftime(Sys.time(), file.mtime(parts), units = "mins") > 10])
@@ -31,15 +31,16 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
   saved <- if (resume) read_checkpoint(path, call)
   if (!is.null(saved)) {
     if (!identical(saved$what, what)) {
-      abort_checkpoint(path, paste("is that of a", saved$what), call = call)
+      abort_checkpoint(path, paste("belongs to a", saved$what), call = call)
     }
-    check_same(path, saved$arguments, arguments, paste("is that of another", what), function(name) {
+    check_same(path, saved$arguments, arguments, paste("belongs to another", what), function(name) {
       there <- argument_text(name, saved$arguments[[name]])
       here <- argument_text(name, arguments[[name]])
       if (there == here) {
-        paste0("`", name, "` is another there", if (name == "policy") ", with other weights", ".")
+        paste0("`", name, "` is a different one in the file",
+               if (name == "policy") ", with other weights", ".")
       } else {
-        paste0("`", name, "` is ", there, " there, and ", here, " here.")
+        paste0("`", name, "` is ", there, " in the file, and ", here, " here.")
       }
     }, call)
   }
@@ -48,27 +49,28 @@ open_checkpoint <- function(path, arguments, resume, what, call) {
 
 #' Resume from a training's file, and keep the training in it from now on
 #'
-#' The file grows. If iterations are short, writing may take longer than playing. The file is then
-#' not written after each iteration, and those since the last write would be played again.
+#' The file grows, so writing may take longer than playing if iterations are short. Then the file is
+#' not written after each iteration. A resumed training plays the iterations since the last write
+#' again.
 #' @return A function that is called after each iteration, and at the end with `last = TRUE`.
 #' @noRd
 training_checkpoint <- function(state, settings, call) {
   file <- settings$file
-  # In addition to the arguments: the settings that the server determines.
+  # These settings, which the server determines, must be the same, too.
   server <- settings[c(
     if (settings$search) "target", "env_id", "num_envs", "batch_size", "from_model"
   )]
   if (!is.null(file$saved)) {
-    # Another server may run the sub-environments in another way, and then plays other episodes.
+    # A server that runs the sub-environments in another way plays other episodes.
     names <- c(
       target = "the environment's reward threshold", env_id = "the environment",
-      batch_size = "how many episodes make a batch",
-      num_envs = "how many sub-environments there are",
+      batch_size = "the number of episodes in a batch",
+      num_envs = "the number of sub-environments",
       from_model = "whether it learns from the model"
     )
     there <- file$saved$server
     check_same(file$path, there, server, "is from a server with other settings", function(name) {
-      paste0("There ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
+      paste0("In the file, ", names[[name]], " is ", describe_value(there[[name]]), ", and ",
              describe_value(server[[name]]), " on this server.")
     }, call, are_arguments = FALSE)
     resume_training(state, file$saved)
@@ -129,7 +131,7 @@ finished_training <- function(settings, client) {
     settings$client <- settings$env$client
   }
   inform_resumed(paste(
-    "This", settings$what, "had ended: {.path {path}} has its result.",
+    "This", settings$what, "has already ended: {.path {path}} has its result.",
     "{.code resume = FALSE} plays it again."
   ))
   training_result(settings, state)
@@ -169,7 +171,8 @@ training_arguments <- function(settings) {
     "eval_episodes_curve", "seed"
   )
   agent <- settings$agent
-  # The source of an agent's settings makes no difference. The memory of one that goes on is large.
+  # It makes no difference where an agent's settings come from. The memory of an agent that goes on
+  # is large, so its hash is compared.
   agent$preset <- NULL
   if (inherits(agent$memory, "gym_memory")) agent$memory <- rlang::hash(agent$memory)
   policy <- settings$policy
@@ -206,7 +209,7 @@ environment_traits <- function(env) {
   }
 }
 
-# `line_of` is a function of a name, whose values differ.
+# `line_of(name)` describes how the two values of `name` differ.
 check_same <- function(path, there, here, problem, line_of, call, are_arguments = TRUE) {
   differ <- Filter(function(name) !is_same(there[[name]], here[[name]]), names(here))
   if (length(differ)) {

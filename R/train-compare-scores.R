@@ -39,7 +39,7 @@ compare_by_scores <- function(trainings, curves, settings, reference, call) {
 
 #' Find the score of each run
 #'
-#' If all runs have the same budget in steps, it is the last evaluation. Otherwise it is
+#' If all runs have the same budget in steps, the score is the last evaluation. Otherwise it is
 #' interpolated linearly on the learning curve.
 #' @return A list: `runs`, `steps`, `by_end`, and `notes`, which say how scores were found.
 #' @noRd
@@ -85,7 +85,7 @@ run_scores <- function(trainings, curves, steps, call) {
 
 # Normalising ---------------------------------------------------------------------------
 
-# The return of a random policy, and the environment's threshold.
+# Returns the mean return of a random policy and the environment's threshold.
 default_reference <- function(trainings, call) {
   abort_if(
     !length(trainings), "reference", NULL, call,
@@ -104,7 +104,7 @@ default_reference <- function(trainings, call) {
     high <- training_target(NULL, list(id = one$env_id, reward_threshold = registered))
     abort_if(
       !length(high) || is.na(high), "reference", NULL, call,
-      "{one$env_id} has no threshold, by which scores could be normalised.",
+      "{one$env_id} has no reward threshold, which is needed to normalise scores.",
       i = "Give `reference`, a data frame with the columns env_id, low and high."
     )
     random <- rlang::exec(
@@ -155,7 +155,7 @@ score_table <- function(scores, drawn, level) {
   }))
 }
 
-# The probability that a run of one training scores higher than one of the other: ties count half.
+# The probability that a run of one training scores higher than a run of the other. Ties count half.
 improvement_probability <- function(x, y) {
   each <- Map(function(x, y) {
     wins <- 0

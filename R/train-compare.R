@@ -31,7 +31,8 @@
 #' they needed to reach it. A run whose final evaluation reached it needed all of its steps. A run
 #' whose final evaluation did not reach it has failed: it never reaches the target. Interrupted runs
 #' are left out. The intervals of the share of runs that have reached the target after so many steps
-#' are Wilson's; those of the median are where they contain one half.
+#' are Wilson's. The interval of the median starts at the first number of steps where the upper
+#' bound of the share is at least one half, and ends where the lower bound is.
 #'
 #' @param ... Trainings of class [gym_trainings] or `gym_training`, with or without names. Those of
 #'   one agent in several environments have the same name. Or one data frame as returned by
@@ -164,7 +165,8 @@ check_are_trainings <- function(given, call) {
   )
 }
 
-# All have a target or none has: otherwise there is nothing to compare them by.
+# Trainings with a target are compared by steps, and others by scores, so either all have a target
+# or none.
 stop_at_target <- function(trainings, call) {
   stops <- vapply(trainings, function(x) is.finite(each_training(x)[[1L]]$target %||% Inf), NA)
   abort_if(
@@ -176,7 +178,7 @@ stop_at_target <- function(trainings, call) {
   any(stops)
 }
 
-# Trainings with one name are one agent in several environments, or with other seeds.
+# Trainings of the same agent in several environments, or with other seeds, have the same name.
 check_different_runs <- function(trainings, call) {
   keys <- unlist(Map(function(x, label) {
     vapply(each_training(x), function(one) paste(label, one$env_id, one$seed, sep = "\r"), "")

@@ -1,11 +1,12 @@
-# Training that goes on with what an earlier training has learned.
+# Trainings that go on with the agent of an earlier training.
 
 #' Find the agent that a training starts with
 #'
 #' An agent that was trained before goes on. So does a new agent if `policy` is an earlier training
 #' of the same kind of agent: it takes over everything but the settings. With any other policy the
 #' agent starts again.
-#' @param search Whether candidates are judged by the tutorial's rule; such a search has no past.
+#' @param search Whether candidates are judged by the tutorial's rule. Such a search always starts
+#'   again.
 #' @noRd
 agent_to_train <- function(agent, policy, search, call) {
   if (!search && goes_on_from(policy, class(agent)[[1L]])) {
@@ -16,7 +17,6 @@ agent_to_train <- function(agent, policy, search, call) {
   if (isTRUE(agent$started)) {
     rate <- agent$learning_rate
     taken <- agent$steps %||% agent$taken
-    # With a schedule that has reached 0 the agent would learn nothing more.
     abort_if(
       is.function(rate) && is_number(taken) && isTRUE(rate(taken) == 0),
       "learning_rate", rate, call,
@@ -58,7 +58,7 @@ own_arguments <- function(agent) {
   arguments
 }
 
-# Settings that determine what an agent keeps of what it has learned.
+# The form of what an agent has learned depends on these settings, so they cannot change.
 lasting_settings <- c("features", "double", "baseline", "version", "importance", "memory_size")
 
 take_over <- function(earlier, agent, call) {
@@ -70,7 +70,7 @@ take_over <- function(earlier, agent, call) {
     name <- sub("memory_size", "memory", differ[[1L]])
     abort_wrong(
       name, agent[[differ[[1L]]]], call,
-      "The earlier training has another `{name}`, which must stay when it goes on.",
+      "The earlier training has another `{name}`, which cannot change when the agent goes on.",
       i = "Give the same `{name}`, or start with the policy alone: `policy =
            agent_policy(training$agent)`."
     )
@@ -79,7 +79,7 @@ take_over <- function(earlier, agent, call) {
   earlier
 }
 
-# An agent that goes on, in this environment.
+# Binds an agent that goes on to this environment.
 continued_agent <- function(agent, bound, call) {
   if (learns_online(agent)) {
     for (space in names(agent$spaces)) {
@@ -97,7 +97,7 @@ continued_agent <- function(agent, bound, call) {
 
 #' Find the policy to train
 #' @param agent As agent_to_train() returns it.
-#' @return `NULL` for a learner that makes its own.
+#' @return A policy, or `NULL` for a learner that makes its own.
 #' @noRd
 policy_to_train <- function(policy, agent) {
   online <- learns_online(agent)
@@ -105,7 +105,8 @@ policy_to_train <- function(policy, agent) {
     if (!online) agent$policy
   } else if (inherits(agent, "gym_agent_gradient") && inherits(policy, "gym_training") &&
                inherits(policy$agent, "gym_agent_gradient")) {
-    # The one that was trained, which draws its actions, not the one that was evaluated.
+    # Start with the policy that was trained, which draws its actions, and not with the greedy
+    # policy that was evaluated.
     agent_policy(policy$agent)
   } else {
     trained_policy(policy)

@@ -4,12 +4,12 @@
 #'
 #' Files may come from other programs:
 #'
-#' * a folder with a log of this package (`train_agent(log = )`), or with one below it for each
+#' * a folder with a log of this package (`train_agent(log = )`), or with such a folder for each
 #'   seed;
 #' * a folder of Stable-Baselines3 with `progress.csv` (from its logger): the evaluations
 #'   (`eval/mean_reward`), or without them the episodes of `monitor.csv` files (from its Monitor, or
-#'   `0.monitor.csv` and so on, ordered by time), or otherwise `rollout/ep_rew_mean`; or such a file
-#'   itself;
+#'   `0.monitor.csv` and so on, ordered by time), or otherwise `rollout/ep_rew_mean`. You can also
+#'   give such a file;
 #' * CSV files of CleanRL's `charts/episodic_return`, as exported by Weights & Biases (a column for
 #'   each run, or the history of one) or TensorBoard (`Wall time`, `Step`, `Value`); or a folder of
 #'   them.
@@ -23,7 +23,7 @@
 #' @param at `NULL`, the default, or the numbers of steps at which to return all curves, for means
 #'   over seeds. Between two evaluations the return is interpolated linearly. After its end a run
 #'   counts with its last evaluation, as in [plot()][plot.gym_trainings()]. Before its first
-#'   evaluation it has `NA`. Their `kind` is `"interpolated"`.
+#'   evaluation it has `NA`. The `kind` of these rows is `"interpolated"`.
 #' @return A data frame with a row for each evaluation: `training`, `env_id` (strings, `NA` if the
 #'   log does not have it), `seed` (a whole number; for other programs the one in a name such as
 #'   `seed-3` or CleanRL's `CartPole-v1__ppo__3__1700000000`, otherwise the run's number),
@@ -32,8 +32,8 @@
 #'   `lower`, `upper` (its standard error and 95% interval, doubles, `NA` if unknown) and `episodes`
 #'   (integer).
 #' @section Errors: `gym_error_argument` for an object that is neither a training nor a log, for a
-#'   damaged log, and for the result of [search_random()], which has no evaluations. Damaged logs
-#'   beside others are left out with a warning, `gym_warning_log`.
+#'   damaged log, and for the result of [search_random()], which has no evaluations. If only some
+#'   logs are damaged, they are left out with a warning, `gym_warning_log`.
 #' @seealso [compare_trainings()], and [plot()][plot.gym_trainings()] for a picture.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -63,7 +63,7 @@ curves_of <- function(trainings, call) {
   }, trainings, names(trainings)))
 }
 
-# All runs at the same numbers of steps.
+# Returns all runs at the same numbers of steps.
 curves_at <- function(table, at) {
   runs <- split_in_order(table, table$training, table$env_id, table$seed)
   each <- lapply(runs, function(own) {
@@ -114,7 +114,7 @@ curve_rows <- function(x, label, call) {
       is.null(rows), "...", x, call, '"{x}" has no log of a training.',
       i = "A log is a folder of `train_agent(log = )`, `progress.csv` or `monitor.csv` of
            Stable-Baselines3, or a CSV file of CleanRL's `charts/episodic_return`.",
-      i = if (endsWith(x, ".rds")) "A result that `readRDS()` returns is an argument, too."
+      i = if (endsWith(x, ".rds")) "For a saved result, give what `readRDS()` returns."
     )
     # Runs with unknown seeds are numbered.
     unknown <- is.na(rows$seed)
@@ -126,14 +126,14 @@ curve_rows <- function(x, label, call) {
   }
 }
 
-# From files of logs --------------------------------------------------------------------
+# Reading logs --------------------------------------------------------------------------
 
 # Learning curves from log files: our own, Stable-Baselines3's and CleanRL's.
 
 #' Read files or folders, each by itself
 #'
-#' A crash may leave a damaged file, which must not hide the others: it is warned of. If all are
-#' damaged, the first one is an error.
+#' A crash may leave a damaged file. It must not hide the others, so it is left out with a warning.
+#' If all files are damaged, the first one is an error.
 #' @return A list of what `read` returned for those that are not damaged.
 #' @noRd
 read_logs <- function(paths, call, read = function(path) path_curves(path, call)) {
@@ -208,7 +208,7 @@ file_table <- function(file) {
   }
 }
 
-# Stable-Baselines3's logger, whose columns ours has, too.
+# Reads the columns of Stable-Baselines3's logger, which our log has, too.
 progress_curves <- function(table, file) {
   evaluated <- any(!is.na(table[["eval/mean_reward"]]))
   value <- table[[if (evaluated) "eval/mean_reward" else "rollout/ep_rew_mean"]]
@@ -219,8 +219,9 @@ progress_curves <- function(table, file) {
   run_rows(dirname(file), rows)
 }
 
-# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. In a
-# resumed file that line has the start of the first session, and time begins anew in each.
+# Stable-Baselines3's Monitor: a line of JSON, then reward, length and time of each episode. If a
+# training was resumed, that line has the start of the first session, and the times of each session
+# begin at 0.
 monitor_episodes <- function(lines) {
   about <- jsonlite::fromJSON(sub("^#", "", lines[[1L]]))
   rows <- utils::read.csv(text = c(lines[-1L], if (length(lines) == 1L) "r,l,t"))
@@ -244,8 +245,8 @@ monitor_curves <- function(episodes, path) {
   run_rows(path, rows, env_id = episodes$env_id[1L])
 }
 
-# A table of TensorBoard has one run. One of Weights & Biases has the columns of one run, or a
-# column for each, named after it.
+# A table of TensorBoard has one run. A table of Weights & Biases has the columns of one run, or a
+# column for each run, named after the run.
 cleanrl_curves <- function(table, file) {
   if (all(c("Step", "Value") %in% names(table))) {
     return(run_rows(file, training_rows(table$Step, table$Value)))
@@ -272,8 +273,8 @@ log_numbers <- function(x) {
   as.numeric(x)
 }
 
-# A run with all columns. If the log lacks a value, it is taken from the name of the run: CleanRL's
-# consists of environment, script, seed and time.
+# Completes the columns of a run. A value that the log lacks is taken from the name of the run:
+# CleanRL's names consist of environment, script, seed and time.
 run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
   name <- basename(run)
   pattern <- "^(run-)?(.+)__(.+)__([0-9]+)__[0-9]+.*$"
@@ -285,7 +286,7 @@ run_rows <- function(run, rows, env_id = NULL, seed = NULL) {
     seed <- seed %||% sub(".*seed[-_=]?([0-9]+).*", "\\1", name)
   }
   rows[c("steps", "mean_return")] <- lapply(rows[c("steps", "mean_return")], log_numbers)
-  # A row that logs other values lacks these, and so does a line that a crash has cut off.
+  # A row that logs other values lacks these two, and so does a line that a crash has cut off.
   rows <- rows[!is.na(rows$steps) & !is.na(rows$mean_return), ]
   missing <- setdiff(names(no_curve), names(rows))
   rows[missing] <- lapply(no_curve[missing], function(none) rep(none[NA_integer_], nrow(rows)))

@@ -1,4 +1,4 @@
-# When training ends, and the evaluations of the agent's own policy.
+# Evaluates the agent's own policy, and decides when training ends.
 
 # Training uses the seeds of episodes up to this number, and evaluations use those above it. The
 # upper half of these is for the final evaluation. So no evaluation plays an episode of the
@@ -18,8 +18,8 @@ training_target <- function(settings, spec) {
 
 #' Has the training reached its target?
 #'
-#' Only this function sets `solved`. A search is solved by the round that reaches the target; later
-#' ones were not played. Otherwise an evaluation decides.
+#' In a search, the round that reaches the target decides. In any other training, an evaluation
+#' does.
 #' @noRd
 training_ends <- function(state, vector_env, settings) {
   if (settings$search) {
@@ -46,9 +46,9 @@ training_ends <- function(state, vector_env, settings) {
   state$solved
 }
 
-# An iteration of DQN is a single episode, and one lucky episode does not justify an evaluation with
-# 100. An agent that gets trajectories is therefore judged by its last iterations that have at least
-# this many episodes together, the smallest number that PPO plays in an iteration.
+# DQN plays a single episode an iteration, and one lucky episode does not justify an evaluation. For
+# an agent that gets trajectories, the last iterations therefore count together, as many as have at
+# least this many episodes. PPO plays no fewer in one iteration.
 enough_episodes <- 8L
 
 recent_return <- function(state) {
@@ -138,8 +138,8 @@ play_evaluation <- function(state, vector_env, settings, policy, episodes, final
   evaluate_episodes(episodes, policy)
 }
 
-# Without a limit a policy might never end an episode, such as one that never starts a game of
-# Breakout. See ?train_agent.
+# Without a limit an episode might never end: a policy may never start the game of Breakout. See
+# ?train_agent.
 evaluation_limit <- function(state, vector_env, settings) {
   if (!is.null(settings$max_steps) || !is.null(vector_env$spec$max_episode_steps)) {
     return(settings$max_steps %||% Inf)

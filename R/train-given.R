@@ -1,11 +1,11 @@
-# The results passed to a function that compares them, with their names.
+# Functions that compare results take them as arguments. Here each result gets a name.
 
 #' Take the arguments of the calling function, each result with a name
 #'
-#' Results that can be compared have a name in the picture: that of the argument, of the variable,
-#' or a label of their own. Other arguments need a name.
-#' @param first The function's first argument, a symbol. It may be given under another name, that of
-#'   its row or line; then it is missing.
+#' The picture shows each result under the name of its argument, of its variable, or under a label
+#' of its own. Other arguments need a name.
+#' @param first The function's first argument, a symbol. It is missing if the user has named the
+#'   first result, as its row or line in the picture.
 #' @noRd
 arguments_as_written <- function(first, frame = rlang::caller_env(), call = frame) {
   listed <- as.call(c(quote(list), if (!eval(call("missing", first), frame)) first, quote(...)))
@@ -16,7 +16,7 @@ arguments_as_written <- function(first, frame = rlang::caller_env(), call = fram
   written <- as.list(eval(call("substitute", listed), frame))[-1L]
   for (value in values[!nzchar(rlang::names2(values))]) {
     if (!inherits(value, c("gym_rollout", "gym_training", "gym_trainings"))) {
-      must <- "a result as the others, or have a name, such as `type = `"
+      must <- "a result like the others, or have a name, such as `type = `"
       abort_argument(value, must, "...", call)
     }
   }
@@ -51,8 +51,8 @@ result_label <- function(x) {
 
 training_label <- function(x) sub(":.*", "", format(x$agent))
 
-#' Return the results among the arguments of a picture; any other argument is an error
-#' @param unique Make the names different within each environment, which has a panel?
+#' Return the results among the arguments of a picture, and refuse all other arguments
+#' @param unique Make the names in each environment different? (Each environment has its own panel.)
 #' @return The results, a list with names.
 #' @noRd
 only_results <- function(values, class, call = rlang::caller_env(), unique = TRUE) {
@@ -69,9 +69,9 @@ only_results <- function(values, class, call = rlang::caller_env(), unique = TRU
 given_trainings <- function(values, call = rlang::caller_env(), unique = TRUE) {
   abort_if(
     any(vapply(values, inherits, NA, "gym_search")), "...", NULL, call,
-    "A search by `search_random()` has no evaluations that could be compared with those of a
+    "A search by `search_random()` has no evaluations to compare with those of a
      training.",
-    i = "`train_agent(agent_random(), ...)` has."
+    i = "`train_agent(agent_random(), ...)` makes a training that has them."
   )
   only_results(values, c("gym_training", "gym_trainings"), call, unique)
 }
@@ -84,14 +84,14 @@ each_training <- function(x) if (inherits(x, "gym_trainings")) unname(x$training
 # Differences that make a comparison of trainings unfair: targets, budgets, environments or rules of
 # evaluation.
 
-# The arguments that a training keeps for this, in addition to the target.
+# These arguments of train_agent() are compared, in addition to the target.
 kept_rules <- c("iterations", "total_steps", "max_steps", "eval_every", "eval_episodes",
                 "eval_episodes_curve", "evaluate")
 
 #' Name the differences between trainings in one environment
 #' @param trainings A list of trainings, or of trainings with many seeds, with names.
 #' @return A string for each kind of difference, such as `"targets differ: A: 475; B: 490"`. With
-#'   several environments it names the one, as in `"targets differ in CartPole-v1: ..."`.
+#'   several environments it names the environment: `"targets differ in CartPole-v1: ..."`.
 #' @noRd
 unequal_rules <- function(trainings) {
   by_env <- split(trainings, vapply(trainings, function(x) x$env_id, ""))

@@ -35,7 +35,7 @@
 #'   `policy$action_space`.
 #' @export
 #' @examples
-#' # Keeps the mean reward of each action, whatever the state, and tries each 10 times.
+#' # Keep the mean reward of each action, whatever the state, and try each action 10 times first.
 #' agent_mean <- function() structure(list(), class = c("mean_reward", "gym_learner", "gym_agent"))
 #' agent_start.mean_reward <- function(agent, policy) {
 #'   agent$total <- agent$count <- numeric(policy$action_space$n)
@@ -57,7 +57,7 @@
 #'   policy_table(rbind(mean, mean))
 #' }
 #'
-#' # One state, and the end.
+#' # A model with one state and the end of the episode.
 #' coin <- gym_model(data.frame(
 #'   state = 0, action = c(0, 1, 1), next_state = 1, probability = c(1, 0.5, 0.5),
 #'   reward = c(1, 0, 3)
@@ -71,8 +71,8 @@ agent_observe <- function(agent, transitions) UseMethod("agent_observe")
 
 learns_online <- function(agent) inherits(agent, "gym_learner")
 
-# By default a learner plays in one sub-environment, except one that learns between episodes on a
-# server. An environment that was made before keeps its number.
+# By default a learner plays in one sub-environment. Monte Carlo learns only after episodes, so on a
+# server it plays in several. An environment that already exists keeps its number.
 learner_envs <- function(env, agent) {
   served <- is_made_by_server(env)
   if (served && !inherits(agent, "gym_agent_monte_carlo") || is_registered(env) ||
@@ -81,8 +81,8 @@ learner_envs <- function(env, agent) {
   }
 }
 
-# The argument of a learner's `agent_start()`: the given policy, with the spaces, and with the
-# actions of each state if there is a model.
+# Makes the policy that a learner's `agent_start()` gets: the given one, with the spaces, and, if
+# there is a model, with the actions of each state.
 spaces_policy <- function(policy, vector_env, model, call) {
   bound <- if (is.null(policy)) {
     structure(
@@ -137,7 +137,7 @@ learn_episodes <- function(state, vector_env, settings, call) {
   c(list(agent = learner$export()), played)
 }
 
-# Whether a learner can learn from whole episodes, as an agent that is told of iterations does.
+# Whether a learner can learn from whole episodes after an iteration, by agent_tell().
 plays_whole <- function(agent) {
   inherits(agent, "gym_agent_monte_carlo") &&
     learns_whole(agent$mask, agent$exploring_starts, agent$importance)
@@ -148,7 +148,7 @@ learns_whole <- function(mask, exploring_starts, importance) {
   is.null(mask) && !isTRUE(exploring_starts) && identical(importance[1L] %||% "none", "none")
 }
 
-# Whether the agent learns during play in this training; asked once.
+# Whether the agent learns during play. The answer is kept for the whole training.
 learns_in_play <- function(state, vector_env, settings) {
   state$in_play <- state$in_play %||% (learns_online(state$agent) && !(
     plays_whole(state$agent) && plays_beside(
@@ -158,7 +158,7 @@ learns_in_play <- function(state, vector_env, settings) {
   state$in_play
 }
 
-# One sub-environment plays one episode after the other.
+# Plays one episode after the other in a single sub-environment.
 learn_alone <- function(learner, state, vector_env, settings, call) {
   world <- state$world
   if (is.null(world) || !is.null(state$agent$mask)) {
@@ -173,7 +173,7 @@ learn_alone <- function(learner, state, vector_env, settings, call) {
   ))
 }
 
-# The episodes of an iteration, in the same loop as rollouts.
+# Plays the episodes of an iteration in the same loop as rollouts.
 play_iteration <- function(state, vector_env, settings, learner) {
   history <- new_history(1L, settings$episodes, state$streams)
   history$draw_seeds <- draw_training_seeds
@@ -185,7 +185,7 @@ play_iteration <- function(state, vector_env, settings, learner) {
   history
 }
 
-# An infinite reward makes a learned value infinite for ever.
+# After one infinite reward, a learned value would stay infinite.
 check_rewards <- function(reward, call) {
   if (!all(is.finite(reward))) {
     gym_abort(
@@ -196,7 +196,7 @@ check_rewards <- function(reward, call) {
   }
 }
 
-# Judging by a model ------------------------------------------------------------------
+# Evaluating by a model ---------------------------------------------------------------
 
 #' Get the model by which a learner's policy is evaluated, or `NULL`
 #'
@@ -221,7 +221,7 @@ judging_model <- function(settings, client) {
   )
   if (!is.null(model)) {
     if (served) model$versions <- server_versions(client)
-    # Each evaluation needs it.
+    # Compute this once, because each evaluation needs it.
     model$backup <- backup_of(model, NULL)
   }
   model
@@ -284,9 +284,9 @@ model_limit <- function(model, max_steps) {
 
 #' Compute how many steps of the training must lie between two exact evaluations
 #'
-#' Choose it so that the evaluations take about a tenth of the time. Use counts and not a clock, so
-#' that a seed always gives the same result. A step takes about as long as the new values of
-#' 500 states. Where all the sweeps of an evaluation together take a millisecond, none is left out.
+#' The evaluations should take about a tenth of the time. The number is computed from counts and not
+#' from a clock, so that a seed always gives the same result. A training step takes about as long as
+#' the update of 500 states. Evaluations of a millisecond or less are never left out.
 #' @return A number of steps.
 #' @noRd
 steps_between_evaluations <- function(model, max_steps) {

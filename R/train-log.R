@@ -1,4 +1,4 @@
-# The log of a training: a folder with two tables that grow, and what was trained.
+# The log of a training: a folder with two tables that grow, and a file that says what was trained.
 
 # The columns of progress.csv, as Stable-Baselines3 names them
 # (https://stable-baselines3.readthedocs.io/en/master/common/logger.html).
@@ -8,11 +8,11 @@ log_columns <- c(
   "rollout/ep_len_mean", "eval/mean_reward", "eval/mean_ep_length"
 )
 
-# The table's lines from this iteration on. The first line has the column names.
+# The lines of progress.csv from this iteration on. The first line has the column names.
 log_lines <- function(state, from) {
   rows <- rows_table(state$history[seq_along(state$history) >= from], no_iterations)
   evaluations <- rows_table(state$evaluations, no_evaluations)
-  # Of several evaluations in an iteration, the last counts, which had the most episodes.
+  # If an iteration has several evaluations, the last one counts: it has the most episodes.
   evaluations <- evaluations[!duplicated(evaluations$iteration, fromLast = TRUE), ]
   evaluated <- evaluations[match(rows$iteration, evaluations$iteration), ]
   length <- evaluated$steps / evaluated$episodes
@@ -31,7 +31,7 @@ log_lines <- function(state, from) {
   ))
 }
 
-# A row for each evaluation from this one on.
+# The lines of evaluations.csv from this evaluation on, in the same form.
 evaluation_lines <- function(state, from) {
   history <- rows_table(state$history, no_iterations)
   rows <- rows_table(state$evaluations[seq_along(state$evaluations) >= from], no_evaluations)
@@ -52,7 +52,7 @@ csv_lines <- function(table) {
 #' Prepare to log a training
 #'
 #' Both tables are written completely when training begins or resumes, so that they agree with the
-#' history, and after a line could not be written. Otherwise lines are appended.
+#' history, and once more after a write has failed. Otherwise lines are appended.
 #' @param state The training as it begins or resumes.
 #' @return A function that is called after each iteration.
 #' @noRd

@@ -9,7 +9,7 @@
 run_training <- function(state, vector_env, settings, progress, call) {
   show <- training_progress(settings, state, progress)
   play <- function() {
-    # The untrained policy, if its episodes are sure to end.
+    # Evaluate the untrained policy, if its episodes are sure to end.
     limit <- settings$max_steps %||% vector_env$spec$max_episode_steps
     begins <- !state$iteration && !length(state$evaluations) && !is.null(limit)
     if (begins && !settings$search) evaluate_agent(state, vector_env, settings, "curve")
@@ -74,7 +74,7 @@ train_iteration <- function(state, vector_env, settings, call) {
     must <- paste("some of", paste0("\"", known, "\"", collapse = ", "))
     abort_agent(needs, "agent_needs()", must, call)
   }
-  # A behavior policy may be drawn.
+  # A method of agent_behavior() may draw random numbers.
   candidates <- with_generator(state$streams$agent, agent_behavior(agent))
   asked <- if (inherits(candidates, "gym_policy_network")) {
     asked_weights(state, agent, count_weights(candidates), call)
@@ -105,7 +105,8 @@ train_iteration <- function(state, vector_env, settings, call) {
   agent <- with_generator(state$streams$agent, agent_tell(agent, results))
   check_is_agent(agent, "agent_tell()", call)
   episodes <- if (settings$search) episodes_table(history$batches, several = TRUE)
-  # An agent that learns from steps gets the results of its episodes, not the means of candidates.
+  # For an agent that learns from steps, the history has the results of its episodes, not the means
+  # of candidates.
   if (keep_steps) results[c("returns", "lengths")] <- episode_results(history)
   enter_iteration(state, settings, agent, results, steps, episodes)
 }
@@ -189,7 +190,8 @@ abort_agent <- function(value, method, must, call) {
   )
 }
 
-# The results of an agent's candidates. Those after the one that ended the search were not played.
+# Returns the results of an agent's candidates. After the candidate that ended a search, none were
+# played.
 candidate_results <- function(history, asked, call) {
   results <- lapply(episode_results(history), function(x) colMeans(matrix(x, history$episodes)))
   returns <- results$returns
@@ -219,14 +221,14 @@ has_target <- function(x) !is.null(x$target) && is.finite(x$target)
 
 reaches <- function(mean_return, target) !is.null(target) && isTRUE(mean_return >= target)
 
-# A progress bar: a function that is called after each iteration. During a batch of rounds of a
-# search, it also gets the number of finished episodes.
+# Makes a progress bar. Returns a function that is called after each iteration. During a batch of
+# rounds of a search, it also gets the number of finished episodes.
 training_progress <- function(settings, state, progress, frame = parent.frame()) {
   by_steps <- is.null(settings$iterations)
   unit <- if (by_steps) "Step" else if (settings$search) "Round" else "Iteration"
   total <- settings$iterations %||% settings$total_steps
   bar <- progress_bar(total, unit, shown = progress, frame = frame)
-  # A script has no bar: after a while it says once how long the training may take.
+  # Without a bar, a message after a while says how long the training may take, once.
   told <- begun <- progress
   started <- now()
   before <- if (by_steps) state$steps else state$iteration
@@ -249,7 +251,7 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
     show
   } else {
     function(episodes) {
-      # The first iteration may be long.
+      # The first iteration may take long, so report that training has begun.
       elapsed <- now() - started
       if (!begun && state$iteration == 0L) begun <<- inform_of_start(episodes, elapsed)
     }
@@ -258,7 +260,7 @@ training_progress <- function(settings, state, progress, frame = parent.frame())
   show
 }
 
-# Report a training without a progress bar after this many seconds, if at least so many are left.
+# Without a progress bar, report after `pace_after` seconds, if at least `pace_left` are left.
 pace_after <- 5
 pace_left <- 60
 

@@ -42,7 +42,7 @@ training_result <- function(settings, state, interrupted = FALSE) {
   )
 }
 
-# Combines rows, lists or data frames, into a data frame; `none` is the one without rows.
+# Combines rows (lists or data frames) into a data frame. Without rows it returns `none`.
 rows_table <- function(rows, none) {
   if (!length(rows)) {
     return(none)
@@ -123,7 +123,7 @@ training_lines <- function(x) {
   )
 }
 
-# What the final evaluation says of the target.
+# Says whether the final evaluation has reached the target.
 verdict_text <- function(x) {
   if (has_target(x)) {
     paste0(", target ", if (x$solved) "reached" else "not reached")
@@ -157,7 +157,8 @@ coef.gym_training <- function(object, ...) {
 # The steps of the training before each evaluation.
 evaluation_steps <- function(x) c(0, x$history$steps)[x$evaluations$iteration + 1L]
 
-# What the row of an iteration describes: an agent that learns from steps plays one policy.
+# What a row of the history summarises. An agent that learns from steps plays one policy, so its
+# rows summarise episodes.
 returned_unit <- function(agent) {
   by_steps <- learns_online(agent) || "trajectories" %in% agent_needs(agent)
   if (by_steps) "episodes" else "candidates"
@@ -181,10 +182,10 @@ summary.gym_training <- function(object, ...) object
 #' @return An object of class `gym_provenance`, which prints a line for each element. It is a list
 #'   of
 #'   * `gym`, `R`, `platform`, `system`, `BLAS`, `LAPACK`: strings,
-#'   * `server`: the versions of the server, and of what simulates the environment (such as MuJoCo,
-#'     Box2D or jax), a named list of strings; `NULL` for an environment in R,
+#'   * `server`: the versions of the server and of the simulator (such as MuJoCo, Box2D or jax), a
+#'     named list of strings; `NULL` for an environment in R,
 #'   * `processor`: a string; the server's processor if its processes play, because the last bits of
-#'   NumPy depend on it,
+#'   NumPy's results depend on it,
 #'   * `way`: `"beside the environment"` or `"step by step"`, see [rollout()]; for a learner, how it
 #'   learns,
 #'   * `env_id` (a string), `kwargs` (the environment's arguments, a named list), `wrappers`

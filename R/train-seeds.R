@@ -35,7 +35,7 @@ train_seeds <- function(settings, seeds, progress, client, call) {
     }
   }
   train_all <- function(vector_env) {
-    # Without a target, no seed solves a search.
+    # Without a target, a search could not be solved with any seed.
     abort_if(
       settings$search && is.null(training_target(settings, vector_env$spec)), "target", NULL, call,
       "{environment_label(vector_env)} has no reward threshold, so a search needs a target.",
@@ -63,7 +63,6 @@ train_seeds <- function(settings, seeds, progress, client, call) {
       function() sum(!vapply(trainings, function(training) training$interrupted, NA)),
       length(seeds)
     ),
-    # An error carries the trainings so far, including the current one.
     error = function(cnd) {
       in_training <- inherits(cnd, "gym_error_training")
       if (!length(trainings) && !in_training) {
@@ -104,7 +103,7 @@ seeds_go_to_workers <- function(vector_env, settings) {
     return(FALSE)
   }
   recipe <- training_recipe(vector_env, settings)
-  # A recipe that is no list says why there is none.
+  # If there is no recipe, this is a string that says why.
   obstacle <- if (!is.list(recipe)) {
     recipe
   } else if (refers_to_process(settings[c("agent", "policy", "callback")])) {
@@ -114,14 +113,14 @@ seeds_go_to_workers <- function(vector_env, settings) {
   is.null(obstacle)
 }
 
-# An environment that remembers something over episodes does so on the worker, too, which plays a
-# whole training.
+# A worker plays a whole training, so an environment that remembers earlier episodes can do so
+# there, too.
 training_recipe <- function(vector_env, settings) {
   vector_env$remembers <- NULL
   environment_recipe(settings$played$env, vector_env, settings$played$kwargs %||% list())
 }
 
-# A future for each seed. Results are kept in the order of the seeds.
+# Trains each seed in a future of its own. Results are kept in the order of the seeds.
 train_in_futures <- function(vector_env, runs, keep, call) {
   recipe <- training_recipe(vector_env, runs[[1L]])
   versions <- server_versions(vector_env$client)
@@ -134,7 +133,7 @@ train_in_futures <- function(vector_env, runs, keep, call) {
 #' @exportS3Method
 run_task.gym_task_training <- function(task) {
   settings <- task$run
-  # The plan already uses the cores.
+  # The plan's workers already use the cores.
   if (is_made_by_server(settings$env)) settings$num_workers <- settings$num_workers %||% 0L
   call <- quote(train_agent())
   in_env <- function(play) {
@@ -146,7 +145,7 @@ run_task.gym_task_training <- function(task) {
   train_seed(task$run, in_env, gym_client(), call)
 }
 
-# What differs between seeds: the seed, the checkpoint, the folder of the log.
+# Sets what differs between seeds: the seed, the checkpoint, the folder of the log.
 settings_of_seed <- function(settings, seed, call) {
   settings$seed <- seed
   if (!is.null(settings$checkpoint)) {

@@ -1,10 +1,10 @@
-# One step at a time: the loop in which a learner of this package plays a single sub-environment (a
-# model, an environment in R, or one on a server); and the same learner in several of them.
+# The loop in which a learner of this package plays a single sub-environment, step by step: a model,
+# an environment in R, or one on a server. Below it, the same learner in several of them.
 
 #' Make the functions by which a learner of values learns
 #'
-#' They are made for an iteration and change their state in place. `x` is an observation as `one()`
-#' of the learner's basis returns it. Actions are numbered from 1.
+#' These functions are made for one iteration and change their state in place. `x` is an observation
+#' as `one()` of the learner's basis returns it. Actions are numbered from 1.
 #' @param draw Draws a number from 0 to 1.
 #' @return A list: the functions `act(x, sub_env, observation)`, the first action of an episode, and
 #'   `observe(x, column, reward, after, terminated, ended, sub_env, observation)`, which learns from
@@ -62,8 +62,8 @@ play_steps <- function(learner, world, seeds, limit, report, call) {
 #' @param draw Draws a number from 0 to 1.
 #' @return A list of functions: `reset(seed)`, which returns a list of `x` and the observation, a
 #'   batch of one; and `step(x, column)`, which returns a list of the next `x`, the reward, whether
-#'   the episode terminated, whether it was truncated, and the observation. `guard` is a function of
-#'   code that steps, or `NULL`.
+#'   the episode terminated, whether it was truncated, and the observation. `guard` is a function
+#'   around the code that takes steps, or `NULL`.
 #' @noRd
 world_of <- function(vector_env, basis, draw) {
   if (!is.null(vector_env$model)) {
@@ -187,7 +187,7 @@ side_by_side <- function(learner, agent, call) {
 
 # Masks ----------------------------------------------------------------------------------
 
-# Masks: which actions are valid, according to an environment's infos.
+# A mask says which actions are valid. It is an element of an environment's infos.
 
 #' Let a vector environment tell a learner which actions are valid
 #'
@@ -254,7 +254,8 @@ with_masks <- function(vector_env, name, note, call) {
     }
     out
   }
-  # If the environment starts the next episode itself, its info would replace that of the last step.
+  # If the environment started the next episode itself, its info would replace that of the last
+  # step.
   vector_env$begins_next <- FALSE
   vector_env$step_one <- NULL
   vector_env

@@ -1,7 +1,7 @@
-# Checks of arguments. Each returns its value, invisibly, or aborts with `gym_error_argument`, which
-# names the argument and its value.
+# Checks of arguments. A check that fails raises `gym_error_argument`, which names the argument and
+# its value.
 
-# R's own error for a missing argument names a function that the user has not called.
+# R's own error for a missing argument would name a function that the user has not called.
 check_given <- function(x, hint = NULL, arg = rlang::caller_arg(x), call = rlang::caller_env()) {
   if (missing(x)) {
     abort_wrong(arg, NULL, call, "`{arg}` is missing.", i = hint)
@@ -34,11 +34,11 @@ check_above_zero <- function(x, max = .Machine$double.xmax, arg = rlang::caller_
 # Up to here doubles represent every whole number.
 largest_seed <- 2^53
 
-# The rule for all seeds: those of set.seed(), and larger ones, as in Gymnasium. Seeds of
-# environments are at least 0.
+# All seeds follow this rule: those that set.seed() takes, and larger ones, as in Gymnasium. Seeds
+# of environments are at least 0.
 check_seed <- function(x, min = -.Machine$integer.max, arg = rlang::caller_arg(x),
                        call = rlang::caller_env()) {
-  # Mention the largest one only if it is exceeded.
+  # Mention the largest seed only if `x` exceeds it.
   max <- if (is_number(x) && x > largest_seed) largest_seed else Inf
   check_count(x, min, max, allow_null = TRUE, arg = arg, call = call)
 }
@@ -86,7 +86,7 @@ check_named_list <- function(x, arg = rlang::caller_arg(x), call = rlang::caller
   check_unique_names(x, arg, call)
 }
 
-# JSON would silently keep only the last of them.
+# Of several elements with one name, JSON would silently keep only the last.
 check_unique_names <- function(x, arg, call) {
   twice <- anyDuplicated(names(x))
   if (twice) {
@@ -103,9 +103,10 @@ check_dots_named <- function(dots, example, call = rlang::caller_env()) {
 
 #' Match the names of a call's arguments only whole
 #'
-#' R completes names of arguments before `...`: `learn_ppo("Pendulum-v1", g = 5)` would set `gamma`.
-#' A function whose `...` are arguments of an environment calls this first. If R has completed a
-#' name, the function is called again so that R cannot, and returns that result.
+#' R completes the names of arguments before `...`: `learn_ppo("Pendulum-v1", g = 5)` would set
+#' `gamma`. A function whose `...` may have arguments of an environment calls this first. If R has
+#' completed a name, the function is called again in a way that prevents this, and returns that
+#' result.
 #' @param frame The frame of the function.
 #' @noRd
 match_whole_names <- function(frame = parent.frame()) {
@@ -127,14 +128,15 @@ match_whole_names <- function(frame = parent.frame()) {
     vapply(given, function(name) any(startsWith(open, name)), NA)
   if (any(completed)) {
     whole <- as.list(match.call(f, call[!completed]))
-    # Given without a value they keep their defaults, and R matches no other name to them.
+    # Arguments that are passed without a value keep their defaults, and R matches no other name to
+    # them.
     whole[setdiff(before, names(whole))] <- list(rlang::missing_arg())
     again <- as.call(c(whole, as.list(call)[completed]))
     rlang::eval_bare(bquote(return(eval(quote(.(again)), .(from)))), frame)
   }
 }
 
-# For functions that have `...` only for their methods.
+# For functions that have `...` only because their generic has it.
 check_dots_empty <- function(..., call = rlang::caller_env()) {
   if (...length()) {
     given <- names(list(...))[[1L]] %||% ""
@@ -171,7 +173,7 @@ check_column <- function(x, name, must, are_good, arg, call) {
   }
 }
 
-# Each returns a flag for each value, or a single one for values of another type.
+# Each of these returns a flag for each value, or a single FALSE for values of another type.
 are_finite <- function(x) if (is.numeric(x)) is.finite(x) else FALSE
 are_whole_numbers <- function(x) {
   if (is.numeric(x)) is.finite(x) & x == trunc(x) & abs(x) <= .Machine$integer.max else FALSE

@@ -1,4 +1,5 @@
-# Arrays: in R the first index changes fastest, in Python and in messages ("row by row") the last.
+# In an array of R the first index changes fastest. In Python and in messages the last one does
+# ("row by row").
 
 # Puts elements given row by row (last index fastest) into an array.
 shape_values <- function(values, shape) {
@@ -20,7 +21,8 @@ array_shape <- function(x) dim(x) %||% length(x)
 
 shape_text <- function(shape) paste0("[", paste(shape, collapse = ", "), "]")
 
-# Like split(), with groups in the order in which they come. They may have several keys.
+# Like split(), but the groups are in the order in which they first occur. Each group may have
+# several keys.
 split_in_order <- function(x, ...) {
   key <- paste(..., sep = "\r")
   split(x, factor(key, unique(key)))
@@ -47,8 +49,8 @@ draw_by_row <- function(p) {
   pmin(choice, last)
 }
 
-# The largest number in each row and its column, the first of several. An episode asks about a
-# single row in each step.
+# The largest number in each row, and its column: the first one if several are equal. Both are fast
+# for a single row, which an episode has in each step.
 row_max <- function(x) {
   if (nrow(x) == 1L) max(x) else x[cbind(seq_len(nrow(x)), max.col(x, "first"))]
 }
@@ -61,7 +63,7 @@ one_hot <- function(choice, count) {
   rows
 }
 
-# The column of the largest number in each row; of several one is drawn.
+# The column of the largest number in each row. If several are equal, one of them is drawn.
 any_best_column <- function(x) {
   column <- max.col(x, "first")
   tied <- which(column != max.col(x, "last"))
@@ -82,14 +84,14 @@ any_best_column <- function(x) {
 # Two sets are merged as in Chan, Golub and LeVeque (1979, "Updating formulae and a pairwise
 # algorithm for computing sample variances").
 
-# A number whose standard deviation is below this becomes 0, as in the code of Mania, Guy and Recht
-# (2018), https://github.com/modestyachts/ARS, ARS/filter.py.
+# If the standard deviation of a number is below this, the number becomes 0, as in the code of
+# Mania, Guy and Recht (2018), https://github.com/modestyachts/ARS, ARS/filter.py.
 least_deviation <- 1e-7
 
 no_moments <- function() list(count = 0, mean = NULL, squares = NULL, scale = NULL)
 
 new_moments <- function(count, mean, squares) {
-  # A single observation has no deviation; the authors' code takes the square root of its square.
+  # A single observation has no deviation. Use its absolute value, as the authors' code does.
   deviation <- if (count > 1) sqrt(squares / (count - 1)) else abs(mean)
   list(
     count = as.numeric(count), mean = mean, squares = squares,
@@ -107,7 +109,7 @@ moments_of <- function(values) {
   new_moments(n, mean, .colSums(deviations * deviations, n, ncol(values)))
 }
 
-# The order affects the last bits.
+# The order of `x` and `y` affects the last bits.
 merge_moments <- function(x, y) {
   if (is.null(x) || x$count == 0) {
     return(y)
@@ -123,9 +125,9 @@ merge_moments <- function(x, y) {
   )
 }
 
-# Before the first moments are known, returns the observations unchanged. A number that hardly
-# changed in training may be many of its standard deviations away later; `clip` keeps it from
-# outweighing all others. It is NULL in policies saved by versions that did not clip.
+# Returns the observations unchanged if there are no moments yet. A number that hardly changed in
+# training may later be many standard deviations away from its mean. `clip` keeps it from
+# outweighing all others. `clip` is NULL in policies saved by versions that did not clip.
 normalized <- function(values, moments, clip) {
   if (is.null(moments$mean)) {
     return(values)

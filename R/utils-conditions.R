@@ -6,7 +6,7 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
     # The message may contain text from a server.
     shown_text(message),
     class = c(class, "gym_error"), ..., call = without_tokens(rlang::error_call(call)),
-    # NULL if no token is known: rlang then makes the trace itself.
+    # With NULL, rlang makes the trace itself. That is enough if no token is known.
     trace = if (length(the_session$hidden)) {
       trace <- rlang::trace_back(bottom = frame)
       trace$call <- lapply(trace$call, without_tokens)
@@ -20,10 +20,10 @@ gym_abort <- function(message, class = NULL, ..., call = rlang::caller_env(), pa
 #'
 #' @param argument,value Its name and its value.
 #' @param call The frame of the function that the user has called.
-#' @param ... The lines of the message, with the names of bullets; those without text are left out.
-#'   A string written in the call, also as a branch of `if`, is a template, in which `{x}` is the
-#'   value of R code, as in [cli::pluralize()], and a line break is a space. Any other code gives a
-#'   text that is shown as it is: it may have braces that a user or a server wrote.
+#' @param ... The lines of the message, named by their bullets. Lines without text are left out. A
+#'   string in the call, also in a branch of `if`, is a template as in [cli::pluralize()]: `{x}` is
+#'   the value of R code, and a line break is a space. The result of any other code is shown as it
+#'   is, because a user or a server may have written braces in it.
 #' @param frame Where this code is evaluated.
 #' @noRd
 abort_wrong <- function(argument, value, call, ..., class = "gym_error_argument",
@@ -54,7 +54,7 @@ abort_if <- function(problem, argument, value, call, ..., frame = rlang::caller_
 
 #' Let errors name the call of the function that the user called
 #'
-#' @param code Calls other functions that users call, too.
+#' @param code Code that calls other functions which users can also call.
 #' @param of The names of these functions, strings.
 #' @param call The frame of the function that the user has called.
 #' @noRd
@@ -101,15 +101,16 @@ describe_value <- function(value) {
   if (nchar(text) > 80L) paste0(substr(text, 1L, 77L), "...") else text
 }
 
-# The classes of a user's error, which an error about it keeps, so that users can catch it by them.
+# Returns the own classes of a user's error. Our error about it keeps them, so that users can catch
+# it by them.
 own_classes <- function(cnd) {
   setdiff(class(cnd), c("simpleError", "rlang_error", "error", "condition"))
 }
 
-# Functions that have ended -----------------------------------------------------------------
-# Each stops for one version with an error that names what replaces it.
+# Functions that no longer exist ------------------------------------------------------------
+# For one version, each of these raises an error that names what replaces it.
 
-#' Functions that have ended
+#' Functions that no longer exist
 #'
 #' Calling one of these functions, or making an object of a class that inherits from `GymEnv`, is an
 #' error that names what replaces it. The next version does not have them.

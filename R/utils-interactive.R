@@ -2,9 +2,9 @@
 
 #' Ask a yes-or-no question
 #'
-#' Only if [rlang::is_interactive()]. It asks once: repeated questions would swallow a pasted script
-#' line by line.
-#' @param question The question; its last line is the prompt, the lines above explain it.
+#' Call this only if [rlang::is_interactive()]. It asks once: repeated questions would take the
+#' lines of a pasted script as answers.
+#' @param question The question. Its last line is the prompt, and the lines above explain it.
 #' @param default The answer for just pressing Enter.
 #' @return `TRUE` or `FALSE`; `FALSE` if a dialog was cancelled.
 #' @noRd
@@ -31,20 +31,20 @@ ask_yes_no <- function(question, default, call = rlang::caller_env()) {
   choice == 1L
 }
 
-# A separate function, so that tests can replace it.
+# This is a separate function so that tests can replace it.
 read_answer_line <- function(prompt) readline(prompt)
 
 # Addresses -------------------------------------------------------------------------------
 
 #' Open an address for the user
 #'
-#' The option `getOption("gym.viewer")` may be a function of an address, which opens it, also in a
-#' script, or `FALSE`, which opens nothing. Without the option an interactive session opens the
-#' address in RStudio's viewer, otherwise in the browser.
+#' The option `getOption("gym.viewer")` may be a function that opens an address, also in a script,
+#' or `FALSE`, which opens nothing. Without the option an interactive session opens the address in
+#' RStudio's viewer, otherwise in the browser.
 #' @param address A URL, or the path of a file.
 #' @param viewer The option's value, already checked.
-#' @return Whether something opened it without an error, logical: a machine may have no browser, and
-#'   some browsers fail silently. An error of the option's function is raised.
+#' @return A logical: whether the address was opened without an error. A machine may have no
+#'   browser, and some browsers fail silently. An error of the option's function is not caught.
 #' @noRd
 open_address <- function(address, viewer = check_viewer()) {
   if (isFALSE(viewer)) {
@@ -82,11 +82,11 @@ check_viewer <- function(call = rlang::caller_env()) {
 
 # Paths -----------------------------------------------------------------------------------
 
-# Paths that are used later: the working directory may have changed by then, and tools have their
-# own one and do not expand "~".
+# Makes a path that still works later: the working directory may change, and other programs have
+# their own and do not expand "~".
 
-# normalizePath() does not change the path of a missing file, and returns another one after the file
-# was made if a folder above it is a link.
+# normalizePath() would not do. It leaves the path of a missing file as it is, and if a folder above
+# the file is a link, it returns another path once the file exists.
 absolute_path <- function(path) {
   path <- path.expand(path)
   if (is_windows()) path <- chartr("\\", "/", path)
@@ -108,8 +108,8 @@ is_loopback <- function(base) {
 }
 
 #' Find the host and port of a server on this machine
-#' @return A list of `host`, in the server's form, and `port`; `NULL` for any other address and one
-#'   that a server of ours cannot have.
+#' @return A list of `host`, in the server's form, and `port`. `NULL` for an address on another
+#'   machine, or one that our server cannot have.
 #' @noRd
 local_place <- function(base) {
   pattern <- "^http://(127([.][0-9]{1,3}){3}|localhost|\\[::1\\]):([0-9]{1,5})$"

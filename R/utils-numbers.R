@@ -1,5 +1,5 @@
-# Whole numbers in R: integer if they all fit, otherwise double. No number is ever rounded: a number
-# from a server beyond 2^53 - 1 is an error, and so is bit64's integer64 from a user.
+# Whole numbers are integers in R if they all fit, otherwise doubles. No number is ever rounded: a
+# server's number beyond 2^53 - 1 is an error, and so is a user's integer64 of bit64.
 
 integer_dtypes <- c("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 
@@ -46,16 +46,16 @@ plain_numbers <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_en
   if (is_integer64(x)) {
     abort_argument(x, "numbers of R", arg, call)
   }
-  # In each step, so the usual case is fast.
+  # This runs in each step, so the usual case is fast.
   if (is.list(x) && (is.data.frame(x) || !is.object(x))) {
     for (part in x) plain_numbers(part, arg, call)
   }
   x
 }
 
-# As two halves of 32 bits ---------------------------------------------------------
+# Integers of 64 bits as two halves -------------------------------------------------
 
-# Reads 64-bit integers as two halves, R integers with the bits of an int32: NA is -2^31.
+# Reads each 64-bit integer as two R integers with the bits of an int32, in which NA is -2^31.
 whole_from_halves <- function(bytes, n, signed) {
   halves <- readBin(bytes, "integer", 2L * n, size = 4L, endian = "little")
   lower <- halves[2L * seq_len(n) - 1L]
@@ -89,7 +89,7 @@ bytes_of_whole <- function(x) {
   writeBin(as.vector(halves), raw(), size = 4L, endian = "little")
 }
 
-# The R integer with the bits of an unsigned number below 2^32: NA is 2^31.
+# The R integer with the bits of an unsigned number below 2^32. For 2^31 it is NA.
 int32_bits <- function(x) {
   x <- x - (x >= 2^31) * 2^32
   x[x == -2^31] <- NA

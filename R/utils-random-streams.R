@@ -1,20 +1,21 @@
-# Random numbers: a seed has its own streams, and the session's generator is left as it was. A
+# Random numbers come from streams of a seed, and the session's generator is left as it was. A
 # stream is a `.Random.seed` of R's generator "L'Ecuyer-CMRG", whose streams are far apart, see
-# ?parallel::nextRNGStream. All kinds are fixed, so the session's RNGkind() has no effect.
+# ?parallel::nextRNGStream. The kinds of generators are fixed, so the session's RNGkind() has no
+# effect.
 
 draw_seed <- function() sample.int(.Machine$integer.max, 1L)
 
-# Draws seeds for environments, which accept whole numbers from 0. All are drawn together: the first
-# k of them do not depend on their number.
+# Draws seeds for environments, which accept whole numbers from 0. All are drawn in one call: the
+# first k of them do not depend on `n`.
 draw_environment_seeds <- function(n) sample.int(.Machine$integer.max, n, replace = TRUE)
 
-# The first stream of a seed. set.seed() does not accept a seed beyond 2^31 - 1. A larger one gives
-# two streams: one from its lower 31 bits, and one from the other bits, negative and less 1 so that
-# no smaller seed has it. The generator consists of two smaller ones with three numbers each, and
-# gets one of each stream.
+# The first stream of a seed. set.seed() does not accept a seed beyond 2^31 - 1, so a larger seed is
+# split in two: its lower 31 bits, and a negative number made of the other bits. The signs differ,
+# so no smaller seed gives the same two streams. The generator consists of two generators with three
+# numbers each, and takes one of each stream.
 seed_stream <- function(seed) {
-  # Evaluate it first: a seed that is drawn in the call must change the session's generator.
-  # set.seed() would misread the bits of bit64's numbers.
+  # Evaluate `seed` first: if the call draws it, this must change the session's generator. Convert
+  # it, because set.seed() would misread the bits of bit64's numbers.
   seed <- as.numeric(seed)
   stream_of <- function(seed) {
     set.seed(seed, "L'Ecuyer-CMRG", "Inversion", "Rejection")
@@ -43,7 +44,7 @@ new_generator <- function(seed, stream = seed_stream(seed)) {
 
 #' Run code that draws from a separate generator
 #'
-#' The generator continues where it was, and the session's is restored.
+#' The separate generator continues where it was. Afterwards the session's generator is restored.
 #' @noRd
 with_generator <- function(generator, code) {
   keep_random_state({
@@ -58,7 +59,7 @@ keep_random_state <- function(code) {
   state <- globalenv()$.Random.seed
   if (is.null(state)) {
     # A new session has no .Random.seed, and must have none afterwards. Otherwise its first random
-    # number would depend on the seed used here. R keeps the kinds elsewhere, too.
+    # number would depend on the seed used here. RNGkind() must be restored separately.
     kinds <- RNGkind()
     on.exit({
       suppressWarnings(RNGkind(kinds[[1L]], kinds[[2L]], kinds[[3L]]))
@@ -106,7 +107,7 @@ restore_streams <- function(saved) {
 
 #' Draw numbers from 0 to 1, one at a time
 #'
-#' R takes as long for a single number as for fifty, so this draws in advance.
+#' R takes as long for a single number as for fifty, so this function draws many in advance.
 #' @return A list of functions: `draw()`, and `renew()`, which discards the numbers drawn in
 #'   advance; the next ones then depend only on R's generator.
 #' @noRd

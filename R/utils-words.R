@@ -4,13 +4,13 @@ environment_label <- function(env) env$spec$id %||% "the environment"
 
 count_of <- function(n, noun) paste0(whole_number_text(n), " ", noun, if (n != 1) "s")
 
-# Without an exponent where a reader can count the digits: 50,000 and 100,000, not 1e+05.
+# Writes numbers without an exponent as long as a reader can count the digits: 100,000, not 1e+05.
 number_text <- function(x, ...) marked_text(x, digits = 4L, scientific = 3L, ...)
 
 whole_number_text <- function(n) marked_text(n, scientific = FALSE)
 
-# Thousands have a comma, unless that is the decimal mark, which options(OutDec = ) and a locale
-# change.
+# Separates thousands by a comma. If options(OutDec = ) or the locale makes the comma the decimal
+# mark, by a full stop.
 marked_text <- function(x, ...) {
   if (grepl(",", format(0.5, scientific = FALSE), fixed = TRUE)) {
     format(x, ..., big.mark = ".", decimal.mark = ",")
@@ -19,7 +19,7 @@ marked_text <- function(x, ...) {
   }
 }
 
-# Each number by itself: together all would get as many decimals as the longest one needs.
+# Formats each number by itself: together all would get as many decimals as the longest one needs.
 number_text_each <- function(x) vapply(unname(x), number_text, "")
 
 percent_text <- function(share) paste0(format(100 * share, digits = 2L), "%")
@@ -44,7 +44,7 @@ prints_times <- function() !isFALSE(getOption("gym.print_seconds"))
 # A name without the characters that people confuse.
 plain_name <- function(x) gsub("[._]", "", tolower(x))
 
-# The names of arguments in Stable-Baselines3, RLlib and textbooks, in plain form, and ours.
+# The names of arguments in Stable-Baselines3, RLlib and textbooks (in plain form), with our names.
 other_names <- list(
   alpha = "learning_rate", lr = "learning_rate", eta = "learning_rate", stepsize = "learning_rate",
   gamma = "discount", discountfactor = "discount", discount = "gamma", discountrate = "discount",
@@ -60,8 +60,8 @@ other_names <- list(
   popsize = "population", sigma = "noise"
 )
 
-# The choice that `name` is another library's name of, or probably a misspelling; character(0) for
-# none.
+# Finds the choice that the user probably meant by `name`: a misspelling, or another library's name.
+# Returns character(0) if there is none.
 nearest_name <- function(name, choices) {
   ours <- intersect(other_names[[plain_name(name)]], choices)
   if (length(ours)) {
@@ -77,7 +77,7 @@ nearest_name <- function(name, choices) {
   within <- length(wanted) > 1L & vapply(words(choices), function(of) all(wanted %in% of), NA)
   begins <- nchar(name) > 3L & startsWith(plain_name(choices), plain_name(name))
   close <- distance(identity) <= min(2, ceiling(nchar(name) / 3)) | begins | within
-  # Of equally similar names the one with the same letters is better.
+  # If several names are equally similar, prefer the one with the same letters.
   best <- order(distance(identity), distance(ordered))
   utils::head(choices[best[close[best]]], 1L)
 }
@@ -89,7 +89,7 @@ did_you_mean <- function(name, choices, form = "`%s`") {
 
 quoted_names <- function(names) paste0("`", names, "`", collapse = ", ")
 
-# The names that there are; of many the first ones and the last.
+# Lists the names. If there are many, only the first ones and the last.
 few_names <- function(names) {
   n <- length(names)
   paste0(quoted_names(utils::head(names, if (n > 12L) 10L else n)),
@@ -106,7 +106,7 @@ print_lines <- function(x, lines) {
 
 # Text from a server, made safe for a terminal ---------------------------------------------
 
-# Enough for an error message with a traceback.
+# This is enough for an error message with a traceback.
 longest_shown <- 4000L
 
 # C0 except tab and newline, DEL, C1, and characters that change the direction of text.
@@ -122,7 +122,7 @@ unseen <- paste0(
 #' @param most The largest number of characters of an element.
 #' @noRd
 shown_text <- function(x, most = longest_shown) {
-  # Fast for plain and short texts, the usual case.
+  # Return early for short, plain texts, the usual case.
   if (!length(x) || all(grepl("^[ -~]*$", x, useBytes = TRUE) & nchar(x, "bytes") <= most)) {
     return(x)
   }
@@ -134,14 +134,14 @@ shown_text <- function(x, most = longest_shown) {
   x
 }
 
-# The same for a text within a line.
+# Like shown_text(), but for a text within a line.
 shown_line <- function(x, most = 200L) {
   if (!is.null(x)) gsub("[\t\n]+", " ", shown_text(x, most))
 }
 
 # Tokens ----------------------------------------------------------------------------------
 
-# Remembers a token that errors must not show: an error keeps the call as the script wrote it,
+# Remembers a token that errors must not show. An error shows the call as the script wrote it,
 # perhaps with the token.
 hide_token <- function(token) {
   if (is.character(token)) the_session$hidden <- unique(c(the_session$hidden, token[nzchar(token)]))
@@ -156,7 +156,7 @@ without_tokens <- function(x) {
     x
   } else if (is.character(x)) {
     found <- x %in% the_session$hidden
-    # A short token may be a part of any text by chance.
+    # A short token may be part of a text by chance, so only long ones are searched for.
     for (token in Filter(function(token) nchar(token) >= 8L, the_session$hidden)) {
       found <- found | grepl(token, x, fixed = TRUE)
     }

@@ -1,7 +1,7 @@
-# Where the time of a rollout goes: for each environment of the benchmark the seconds that rollout()
-# takes, and the processor's seconds of R, of the server and of its worker processes, beside the
-# seconds of Python's own loop over as many episodes. Medians of three turns. Only on Linux, which
-# shows a process's time in /proc.
+# Shows where the time of a rollout goes: for each environment of the benchmark, the seconds that
+# rollout() takes, the CPU seconds of R, of the server and of its worker processes, and the seconds
+# of Python's own loop over as many episodes. All are medians of three turns. Needs Linux, which
+# shows the time of a process in /proc.
 #
 #   tools/in-env Rscript --no-init-file tools/bench-cpu.R [LunarLander-v3 ...]
 

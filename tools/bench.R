@@ -1,16 +1,16 @@
-# The benchmark: steps a second of single and vector environments through gym, reticulate,
-# the classic pattern and Python itself, seconds of searches, memory, all with CartPole and
-# alternating actions; whole episodes of ten environments by rollout(); what R's own calls add to a
-# step. All in one run, turn by turn.
+# The benchmark. With CartPole and alternating actions it measures steps a second of single and
+# vector environments through gym, reticulate, the classic pattern and Python itself, the seconds of
+# searches, and memory. It also measures whole episodes of ten environments by rollout(), and what
+# R's own calls add to a step. The contenders take turns in one run.
 #
 #   make bench              half an hour; writes bench.csv, bench.md, bench.png and
 #                           bench-environments.png into vignettes/articles/
-#   make bench QUICK=1      a glance: the same with few turns, into pictures/
+#   make bench QUICK=1      the same with few turns, into pictures/
 #
 # tools/in-env Rscript tools/bench.R [quick] [single] [vector] [r_env] [search] [env_rollouts]
 #   [beside] [wire] [memory] [tables] [data] runs parts.
 #
-#   make bench PARTS=stream      another build of this package against this one; see
+#   make bench PARTS=stream      compares another build of this package with this one; see
 #                                tools/bench/stream.R on how to name it
 #
 #   make bench PARTS=gradients   PPO against Stable-Baselines3, hours; writes
@@ -29,7 +29,7 @@ source("vignettes/pictures.R")
 
 progress <- function(...) message(format(Sys.time(), "%H:%M:%S "), ...)
 
-# `searches`: how often search_random() plays the rounds that the tutorial's way plays once.
+# `searches`: how often search_random() plays the rounds that the tutorial's script plays once.
 settings <- function(quick) {
   if (quick) {
     list(turns = 3L, seconds = 0.3, num_envs = c(1, 32, 1024, 8192), searches = 1L, rounds = 5,

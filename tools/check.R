@@ -1,6 +1,6 @@
-# Builds the package and checks it, both in a temporary folder, and says what the check found.
-# The vignettes are computed once, by the build.
-# Fails on errors and warnings, and on notes but those that say something of the machine.
+# Builds the package and checks it, both in a temporary folder, and says what the check found. The
+# vignettes are computed once, by the build. Fails on errors, warnings and notes, except for notes
+# about the machine.
 
 excusable <- c(
   "unable to verify current time",
@@ -34,9 +34,11 @@ check_package <- function(folder) {
   status == 0 && nrow(bad) == 0
 }
 
-# Compiling to bytes takes most of an installation, and here there are two that run little code.
+# Byte-compiling takes most of the time of an installation. Here are two installations, which run
+# little code.
 Sys.setenv(R_COMPILE_PKGS = "0")
-# Outside of tempdir(), which goes with this process, so that what a failed check wrote stays.
+# This folder is outside of tempdir(), which is deleted with this process: the files of a failed
+# check must stay.
 folder <- tempfile("gym-check-", tmpdir = dirname(tempdir()))
 dir.create(folder)
 good <- check_package(folder)

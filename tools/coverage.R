@@ -1,5 +1,5 @@
-# Which lines of R/ the tests run. Prints the files below 80 %. What fails here need not fail in
-# make test: the instrumented code is slow.
+# Measures which lines of R/ the tests run. Prints the files below 80 %. A test that fails here may
+# pass in make test, because the measured code is slow.
 tests <- sprintf(
   "setwd(%s)
   Sys.setenv(NOT_CRAN = 'true', TESTTHAT_PARALLEL = 'TRUE', TESTTHAT_CPUS = '2')

@@ -12,7 +12,7 @@ draw <- function(name, object, ...) {
   normalizePath(file)
 }
 
-# Fifty random networks may hold none that balances the pole: then another seed.
+# If none of the fifty random networks balances the pole, try another seed.
 for (attempt in 1:5) {
   seed <- sample.int(10000, 1)
   cat("search_random(seed = ", seed, ")\n\n", sep = "")

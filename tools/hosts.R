@@ -1,20 +1,21 @@
-# A proof that trainings run on other hosts: two hosts on this machine, each a network namespace
-# with an address and a core of its own. What they gain, what a batch costs beside playing, what
-# becomes of a training when a worker, a server or a host is lost in its middle, and how workers of
-# a plan compare with worker processes of the server. Only on Linux, as root; where namespaces are
-# not allowed the hosts are mere processes.
+# Shows that trainings run on other hosts: two hosts on this machine, each a network namespace with
+# its own address and core. Measures how much faster training gets, how much time a batch takes
+# besides playing, and how workers of a plan compare with worker processes of the server. Also shows
+# what happens to a training when a worker, a server or a host is lost. Needs Linux and root. If
+# namespaces are not allowed, the hosts are only processes.
 #
 #   tools/in-env Rscript --no-init-file tools/hosts.R [rates] [faults] [ways]      runs parts
 #   tools/in-env Rscript --no-init-file tools/hosts.R faults one                   one fault only
 
 library(gym)
 
-# Else R waits some 40 ms for an acknowledgement before it sends the rest of a larger message.
+# Otherwise R waits some 40 ms for an acknowledgement before it sends the rest of a larger message.
 options(socketOptions = "no-delay")
 
 # Hosts ----------------------------------------------------------------------------------
 
-# Their names have the id of this process, so that two proofs do not meet.
+# The names contain the id of this process, so that two runs of this script do not use the same
+# hosts.
 hosts <- paste0("gym-", Sys.getpid(), "-", 0:1)
 number_of <- function(host) as.integer(sub(".*-", "", host))
 owner_of <- function(host) sub("gym-([0-9]+)-.*", "\\1", host)
@@ -29,7 +30,7 @@ ip <- function(...) {
   system2("ip", c(...), stdout = FALSE, stderr = FALSE) == 0L
 }
 
-# Each host has a cable of its own to the session.
+# A virtual cable connects each host with the session.
 make_host <- function(host) {
   link <- session_link(host)
   commands <- list(
@@ -40,7 +41,7 @@ make_host <- function(host) {
     c("-n", host, "address", "add", paste0(host_address(host), "/24"), "dev", "eth0"),
     c("-n", host, "link", "set", "eth0", "up"),
     c("-n", host, "link", "set", "lo", "up"),
-    # A connection that is cut is given up after seconds, not after a quarter of an hour.
+    # Give up a connection that is cut after seconds, not after a quarter of an hour.
     c("netns", "exec", host, "sysctl", "-qw", "net.ipv4.tcp_retries2=3")
   )
   all(vapply(commands, ip, NA))
@@ -48,7 +49,7 @@ make_host <- function(host) {
 
 has_ip <- nzchar(Sys.which("ip"))
 
-# The namespaces of earlier proofs that were killed are taken away first.
+# First remove the namespaces of earlier runs that were killed.
 make_hosts <- function() {
   if (has_ip) remove_hosts(left_hosts())
   made <- has_ip && all(vapply(hosts, make_host, NA))
@@ -59,7 +60,7 @@ make_hosts <- function() {
   made
 }
 
-# Only processes of the hosts, by their ids.
+# Kills only processes of the hosts, by their ids.
 clear_host <- function(host) {
   tools::pskill(pids_on(host), tools::SIGKILL)
 }
@@ -75,7 +76,7 @@ remove_hosts <- function(which = hosts) {
     clear_host(host)
     if (!has_ip) next
     ip("netns", "delete", host)
-    # The other end of the cable ends with it, but not at once.
+    # The other end of the cable disappears with it, but not at once.
     ip("link", "delete", session_link(host))
   }
 }
@@ -88,12 +89,12 @@ pids_on <- function(host) {
   as.integer(if (known) in_namespace else pids_with(paste0("TMPDIR=", tmp_of(host))))
 }
 
-# Where a host is only a name: the processes whose environment says that they are on it.
+# If a host is only a name, its processes are those whose environment says so.
 pids_with <- function(variable) {
   files <- Sys.glob("/proc/[0-9]*/environ")
   has <- vapply(files, function(file) {
-    # A process may end meanwhile. To leave by a warning would leave the file's connection behind,
-    # of which R has 128.
+    # A process may end meanwhile. If a warning ended the reading, the file's connection would stay
+    # open, and R has only 128.
     bytes <- suppressWarnings(tryCatch(readBin(file, "raw", 1e5), error = function(cnd) raw()))
     lines <- rawToChar(replace(bytes, bytes == 0L, as.raw(10L)))
     variable %in% strsplit(lines, "\n", fixed = TRUE)[[1L]]
@@ -103,7 +104,7 @@ pids_with <- function(variable) {
 
 tmp_of <- function(host) file.path(Sys.getenv("GYM_HOSTS_TMP"), host)
 
-# The processes of a host that are of a kind, "R" or "python".
+# Returns the processes of a host of one kind, "R" or "python".
 pids_of_kind <- function(host, kind) {
   Filter(function(pid) {
     name <- suppressWarnings(try(readLines(file.path("/proc", pid, "comm")), silent = TRUE))
@@ -113,7 +114,7 @@ pids_of_kind <- function(host, kind) {
 
 # Workers --------------------------------------------------------------------------------
 
-# Makes the workers of some hosts those of the plan.
+# Sets a plan with workers on some hosts.
 start_workers <- function(on, namespaces) {
   nodes <- lapply(on, function(host) {
     dir.create(tmp_of(host), showWarnings = FALSE)
@@ -171,8 +172,8 @@ show_table <- function(title, table) {
 
 # Rates ----------------------------------------------------------------------------------
 
-# What a batch costs beside playing: the session's seconds in play_in_futures() less the seconds
-# that the slowest worker says its task took, and the session's seconds between batches.
+# Measures how much time a batch takes besides playing: the session's seconds in play_in_futures()
+# minus the seconds that the slowest worker reports, and the session's seconds between batches.
 batches <- new.env()
 
 watch_batches <- function() {
@@ -199,7 +200,8 @@ forget_batches <- function() {
   suppressMessages(untrace("warn_of_blas", where = asNamespace("gym")))
 }
 
-# Medians of the batches of a training, in milliseconds, without its first and the final evaluation.
+# Returns medians over the batches of a training, in milliseconds, without the first batch and the
+# final evaluation.
 batch_costs <- function() {
   rows <- do.call(rbind, utils::head(batches$rows, -1L))
   took <- (rows[, "ended"] - rows[, "began"])[-1L]
@@ -217,8 +219,8 @@ measure <- function(workers, directions) {
   c(rate = rate_of(train(directions = directions, iterations = 5)), batch_costs())
 }
 
-# The speed of a machine's cores drifts: one host and two take turns, shortly, with workers that are
-# kept, and each turn gives a ratio of its own.
+# The speed of the cores changes over time. So one host and two hosts take short turns, with workers
+# that are kept, and each turn gives a ratio.
 report_rates <- function(namespaces, turns = 6L) {
   workers <- start_workers(hosts, namespaces)
   on.exit(stop_workers(workers))
@@ -248,7 +250,7 @@ batch begins; medians of turns", medians)
 
 # Faults ---------------------------------------------------------------------------------
 
-# Strikes when an iteration's batch has been on its way for a moment.
+# Causes the fault a moment after an iteration's batch was sent.
 later <- function(...) {
   system2("sh", c("-c", shQuote(paste("sleep 0.15;", paste(...)))), wait = FALSE)
 }
@@ -265,7 +267,7 @@ faults <- list(
   "link down" = function(host) later("ip -n", host, "link set eth0 down")
 )
 
-# What is known of a training in whose third iteration the fault strikes the second host.
+# Trains, with a fault on the second host in the third iteration, and returns what happened.
 train_with <- function(fault) {
   warnings <- character()
   started <- proc.time()[["elapsed"]]
@@ -290,7 +292,7 @@ wait_until <- function(done, seconds) {
   while (!done() && Sys.time() < deadline) Sys.sleep(0.1)
 }
 
-# How many processes of a kind, or files, are on all hosts.
+# Counts the processes of a kind, or the files, on all hosts.
 count_on <- function(what) sum(lengths(lapply(hosts, what)))
 
 logs_on <- function(host) {
@@ -333,7 +335,7 @@ of the session alone, and what is left 20 seconds after the end of the workers a
   }
 }
 
-# Ways on this machine -------------------------------------------------------------------
+# Ways to play on this machine -----------------------------------------------------------
 
 on_sessions <- function(workers) {
   force(workers)

@@ -1,29 +1,28 @@
-# Checks that every file of R/ uses only what stands on its own floor or below, and that no name is
-# given twice. A file's floor is
-# its prefix: space-array.R and space.R both have the prefix "space". Prints `layers: clean`, or
-# one line for each use of a higher floor, and then fails.
+# Checks that every file of R/ uses only its own layer and those below, and that no name is defined
+# twice. A file's layer is its prefix: space-array.R and space.R both have the prefix "space".
+# Prints `layers: clean`, or a line for each use of a higher layer, and then fails.
 #
-# What a function uses is what codetools::findGlobals() finds in it, functions that are passed by
-# name included. An S3 method may live above its generic: dispatch is no use. Calls inside of the
-# strings of cli are not seen.
+# codetools::findGlobals() finds what a function uses, also functions that are passed by name. An S3
+# method may be in a layer above its generic, because dispatch does not count as a use. Calls in
+# cli's strings are not found.
 
-# The one list of the floors, from the top.
+# The only list of the layers, from the top.
 floors <- list(
   c("plot", "animate"), "sb3", "agent", "train", "data", "mdp", "play", "policy", "env", "space",
   "client", c("server", "install"), "http", "utils"
 )
 
-# The package's help page and .onLoad() see the whole house.
+# The package's help page and .onLoad() may use all layers.
 outside <- "gym-package.R"
 
-# Its rank counts from the top; NA for a prefix that is not listed.
+# The rank of a file's layer, counted from the top. NA for a prefix that is not listed.
 rank_of <- function(file) {
   prefix <- sub("[-.].*", "", file)
   match(TRUE, vapply(floors, function(floor) prefix %in% floor, NA))
 }
 
-# One row for each top-level object of a file, with all the names that it uses: nested functions,
-# lists and R6 classes lie in the same expression. What is no assignment has the name "".
+# Returns an element for each top-level expression of a file, with all names that it uses, also in
+# nested functions, lists and R6 classes. An expression that is not an assignment has the name "".
 uses_in <- function(file) {
   rows <- lapply(parse(file.path("R", file), keep.source = FALSE), function(expression) {
     is_named <- is.call(expression) && as.character(expression[[1L]])[1L] %in% c("<-", "=") &&
@@ -42,7 +41,7 @@ home <- vapply(objects, function(object) object$file, "")
 names(home) <- vapply(objects, function(object) object$name, "")
 
 problems <- sprintf("R/%s has no known prefix", files[is.na(vapply(files, rank_of, 0L))])
-# Of two objects with one name R keeps the last, and says nothing.
+# If two objects have the same name, R silently keeps the last.
 twice <- unique(names(home)[duplicated(names(home)) & names(home) != ""])
 problems <- c(problems, sprintf("%s is defined more than once", twice))
 for (object in objects) {

@@ -1,6 +1,6 @@
-# How many steps a second learn_q() learns from on Taxi: through the server with one sub-environment
-# and with 32, and on its model in R. Each is run several times in turn; the median is printed, and
-# the ratio to the first.
+# Measures from how many steps a second learn_q() learns in Taxi: through the server and in its
+# model in R, each with one sub-environment and with 32. All take several turns. Prints the medians
+# and their ratios to the first.
 #
 #   tools/in-env Rscript --no-init-file tools/learn-speed.R [runs=5]
 suppressMessages(library(gym))

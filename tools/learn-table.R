@@ -1,10 +1,10 @@
-# Makes the table of learners, inst/extdata/learn-table.csv, a row for each training: learns every
-# environment of tools/learn/jobs.R with seeds that no setting was tried on.
+# Makes the table of learners, inst/extdata/learn-table.csv, with a row for each training. It trains
+# in every environment of tools/learn/jobs.R, with seeds that were not used to choose settings.
 #
 #   tools/in-env Rscript --no-init-file tools/learn-table.R [processes=2] [only=ENV_ID,...]
 #
-# It takes about half an hour. What the table has already is not learned again, so that it may be
-# stopped at any time; a row that is to be made anew is deleted from it first.
+# It takes about half an hour. You can stop it at any time: trainings that are already in the table
+# are not repeated. To repeat one, delete its row first.
 source("tools/processes.R")
 source("tools/learn/jobs.R")
 

@@ -1,10 +1,10 @@
-# Computes what vignette("learning") shows and keeps it in vignettes/learning.rds, so that the
-# vignette builds without a server: four agents with the network of the post, and two that follow
-# gradients with networks of their own, 20 seeds each.
+# Computes the results of vignette("learning") and keeps them in vignettes/learning.rds, so that the
+# vignette builds without a server: four agents with the network of the tutorial, and two that
+# follow gradients with their own networks, 20 seeds each.
 #
 #   tools/in-env Rscript --no-init-file tools/learning-results.R
 #
-# Takes some twenty minutes. Names of agents after the script make these alone anew.
+# Takes some twenty minutes. To train only some agents again, give their names after the script's.
 library(gym)
 
 budget <- 60000
@@ -28,7 +28,7 @@ train <- function(name) {
 }
 trained <- lapply(rlang::set_names(wanted), train)
 
-# What the pictures and tables need of each training.
+# Keeps of each training what the pictures and tables need.
 slim <- function(trainings) {
   trainings$trainings <- lapply(trainings$trainings, function(training) {
     training[c("agent", "env")] <- NULL

@@ -1,8 +1,8 @@
 """Write inst/server/lock/; called by tools/lock, with a folder to work in.
 
-There is one resolution for all extras, all systems and all Pythons that the server supports.
-base.txt has the server's own requirements, EXTRA.txt those that an extra adds, in the format of pip
-and uv. Their first lines are comments, "# key: value", that R reads.
+One resolution serves all extras, all systems and all Pythons that the server supports. base.txt has
+the server's own requirements, and EXTRA.txt those that an extra adds, in the format of pip and uv.
+Their first lines are comments, "# key: value", which R reads.
 """
 
 from __future__ import annotations

@@ -28,7 +28,8 @@ def open_bandit():
     ).obtain_batch_bandit_feedback()
     logged = {name: feedback[name][:ROWS] for name in ("position", "action", "reward", "pscore")}
     actions = feedback["n_actions"]
-    # By the place and the item alone, so that predictions fit in a small table.
+    # The estimate depends on the place and the item alone, so that predictions fit in a small
+    # table.
     model = RegressionModel(
         n_actions=actions,
         len_list=3,

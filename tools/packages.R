@@ -2,7 +2,7 @@
 #   Rscript tools/packages.R lacking GOAL...             prints "need NAME" and "want NAME"
 #   Rscript tools/packages.R install LIBRARY NAME...     from source or binary, as R is set up
 #   Rscript tools/packages.R mirror LIBRARY REPOSITORY   newest versions of all we use, into LIBRARY
-# A goal fails without what it needs; what it only wants makes some of its tests be skipped.
+# A goal fails without a package that it needs. Without one that it wants, some tests are skipped.
 
 declared <- function(field) {
   text <- read.dcf("DESCRIPTION", fields = field)[1, 1]
@@ -18,7 +18,8 @@ is_installed <- function(package) {
     (is.na(minimum) || utils::packageVersion(package) >= minimum)
 }
 
-# It needs 60 packages of apt. ffmpeg, which the server's extra "video" has, writes the same files.
+# Not av, which needs 60 packages of apt. ffmpeg, which the server's extra "video" has, writes the
+# same files.
 too_large <- "av"
 
 goal_packages <- function(goal) {
@@ -61,7 +62,7 @@ renew_library <- function(library, made_for = paste(getRversion()[1, 1:2], R.ver
   }
 }
 
-# A URL that install.packages() understands also when the folder's name has blanks in it.
+# Returns a URL that install.packages() understands even if the folder's name has blanks.
 folder_url <- function(folder) paste0("file://", normalizePath(folder, winslash = "/"))
 
 chosen_mirror <- function() {

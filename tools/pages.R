@@ -1,5 +1,5 @@
 # Builds the vignettes once and installs the package with them into .r-library/, where
-# browseVignettes("gym") finds them. Prints where they begin.
+# browseVignettes("gym") finds them. Prints the address of their first page.
 source("tools/tarball.R")
 
 contents <- file.path(normalizePath(".r-library/gym"), "doc", "index.html")

@@ -1,9 +1,9 @@
-# Draws a picture of each kind, small (4 inches wide) and large (7 inches), to be looked at by eye.
+# Draws a picture of each kind, small (4 inches wide) and large (7 inches), for a look at them.
 #
 #   tools/in-env Rscript --no-init-file tools/pictures.R [FOLDER]     FOLDER: pictures/kinds
 #
-# What was played is that of the vignettes, where they have it. Takes a minute, and the packages
-# magick and png.
+# Uses the results of the vignettes where possible. Takes a minute, and needs the packages magick
+# and png.
 
 library(gym)
 

@@ -1,9 +1,9 @@
-# Runs scripts side by side, each in a process of R's own that writes what it made to a file.
+# Runs scripts side by side. Each runs in its own R process and writes its result to a file.
 
 #' @param script The script, which gets the arguments of a task and the name of the file.
 #' @param tasks A list of the tasks' arguments, character vectors.
-#' @param finish A function of what the file has and of the task's arguments, called when it has
-#'   ended.
+#' @param finish A function of the file's content and of the task's arguments, which is called when
+#'   the task has ended.
 run_side_by_side <- function(script, tasks, processes, finish) {
   start <- function(task) {
     file <- tempfile(fileext = ".rds")
@@ -17,7 +17,7 @@ run_side_by_side <- function(script, tasks, processes, finish) {
     if (file.exists(one$file)) {
       finish(readRDS(one$file), one$task)
     } else {
-      # The others go on; this one is run when the script runs again.
+      # The other tasks go on. This one runs again when the script runs again.
       cat(one$task, "failed:", readLines(paste0(one$file, ".txt")), sep = "\n")
     }
   }

@@ -10,7 +10,7 @@ import numpy as np
 from rliable import library, metrics
 
 rng = np.random.default_rng(1)
-# Runs x environments. Rounded, so that some scores are equal.
+# A matrix of runs by environments. It is rounded, so that some scores are equal.
 scores = {
     "x": np.round(rng.normal(0.6, 0.3, (10, 3)), 2),
     "y": np.round(rng.normal(0.5, 0.4, (8, 3)), 2),

@@ -1,15 +1,16 @@
 # Runs tests/testthat against the installed package and closes with one line of counts.
 #   Rscript tools/run-tests.R [PATTERN]     PATTERN chooses files: what stands after "test-"
-# A test is one test_that() block: failed when anything in it failed, skipped when it was skipped
-# or holds no expectation. Where GYM_R_LIBRARY names a library of the checkout, what that library
-# holds must be loaded from there. GYM_TEST_CPUS processes play the files, each with a server.
+# A test is one test_that() block. It has failed if anything in it failed, and was skipped if it was
+# skipped or has no expectation. If GYM_R_LIBRARY names a library of the checkout, the packages in
+# that library must be loaded from there. GYM_TEST_CPUS processes run the files, each with its own
+# server.
 
-# As the package has it when it loads processx itself, which testthat loads before it.
+# The package sets this when it loads processx, but testthat loads processx first.
 Sys.setenv(PROCESSX_NOTIFY_OLD_SIGCHLD = "true")
 library(testthat)
 Sys.setenv(
   NOT_CRAN = "true", TESTTHAT_PARALLEL = "TRUE", TESTTHAT_CPUS = Sys.getenv("GYM_TEST_CPUS", "3"),
-  # The files share the cores already; PyTorch's threads would wait for each other.
+  # The files already share the cores, so threads of PyTorch would wait for each other.
   OMP_NUM_THREADS = "1"
 )
 Sys.unsetenv("GYM_SERVER_URL")
@@ -28,7 +29,7 @@ state_of <- function(test) {
   }
 }
 
-# What the processes that run the tests find: they have the same libraries.
+# The processes that run the tests find the same packages, because they have the same libraries.
 load_packages <- function(library) {
   for (package in c("gym", if (nzchar(library)) list.files(library))) loadNamespace(package)
 }
@@ -44,7 +45,7 @@ versions_of <- function(packages) {
   toString(sort(paste(packages, versions)))
 }
 
-# What should have come from `library` and did not.
+# Returns the packages that should have come from `library`, but did not.
 not_loaded_from <- function(library) {
   from <- loaded_from()
   held <- intersect(names(from), list.files(library))

@@ -1,12 +1,13 @@
-# Builds the site into site/, with no network and no server but the one that the articles start, and
-# checks that what its pages link to in the site is there.
+# Builds the site into site/, without a network. The articles start the only server. Then checks
+# that all links inside the site lead to something.
 options(pkgdown.internet = FALSE)
-# What CRAN knows of packages that an article names and that are not installed, such as torch.
+# What CRAN knows of packages that an article names but that are not installed, such as torch.
 no_packages <- function() data.frame(Package = character(), URL = character())
 utils::assignInNamespace("CRAN_urls", no_packages, "downlit")
 folder <- "site"
 
-# Where a page's links lead: files of the site, each with the place in it, if one is named.
+# Returns where a page's links lead: files of the site, each with a place in the file if the link
+# names one.
 local_links <- function(page) {
   html <- xml2::read_html(page)
   links <- c(
@@ -46,7 +47,7 @@ link_to_pages <- function(text) {
   gsub('href="NEWS[.](md|html)"', 'href="news/index.html"', text)
 }
 
-# pkgdown's pages load scripts from the network. pkgdown/extra.js does what is needed of them.
+# pkgdown's pages load scripts from the network. pkgdown/extra.js replaces the ones that are needed.
 without_network <- function(text) {
   text <- gsub('<script src="(https?:|file:)[^>]*></script>', "", text)
   text <- gsub('<link rel="stylesheet" href="https?:[^>]*>', "", text)

@@ -1,12 +1,14 @@
 # Makes the table of solved environments, inst/extdata/solve-table.csv.gz (a row for each training),
-# and solve-curves.csv.gz (the evaluations of each): trains every environment of tools/solve/jobs.R
-# with the settings of agent_presets(), with seeds that no setting was tried on.
+# and solve-curves.csv.gz (the evaluations of each). It trains in every environment of
+# tools/solve/jobs.R with the settings of agent_presets(), with seeds that were not used to choose
+# settings.
 #
 #   tools/in-env Rscript --no-init-file tools/solve-table.R [processes=2] [only=ENV_ID,...]
 #     [methods=METHOD,...] [seeds=N]
 #
-# It takes hours. `seeds` trains only the first of each job. What the tables have already is not
-# trained again, so it may be stopped at any time. To make a row anew, delete it from both first.
+# It takes hours. `seeds` trains only the first seeds of each job. You can stop it at any time:
+# trainings that are already in the tables are not repeated. To repeat one, delete its rows from
+# both first.
 source("tools/processes.R")
 source("tools/solve/jobs.R")
 

@@ -6,7 +6,8 @@ r_cmd <- function(..., output = "") {
   system2(r, c("CMD", ...), stdout = output, stderr = output, stdin = "")
 }
 
-# What R CMD build would copy before it drops it: the tools' own folders are left behind at once.
+# R CMD build would first copy the folders of the tools and then drop them, so leave them out from
+# the start.
 copy_of_checkout <- function(into) {
   left_behind <- c(".git", ".venv", ".r-library", ".cran-library", "pictures", "site", "server")
   files <- setdiff(list.files(all.files = TRUE, no.. = TRUE), left_behind)

@@ -1,5 +1,5 @@
-# Computes what the vignette shows and keeps it in vignettes/results.rds, so that
-# the vignette builds without a server. tools/figures.R draws the README's pictures from it.
+# Computes the results of vignette("cartpole") and keeps them in vignettes/results.rds, so that the
+# vignette builds without a server. tools/figures.R draws the README's pictures from them.
 #
 #   tools/in-env Rscript tools/vignette-results.R
 #
@@ -53,7 +53,7 @@ strip <- function(search) {
   search$client <- NULL
   search
 }
-# 500 searches with their episodes and policies have megabytes.
+# 500 searches with their episodes and policies would need megabytes.
 results$searches$trainings <- lapply(results$searches$trainings, function(search) {
   kept <- c("seed", "history", "solved", "stopped_early", "steps", "elapsed", "interrupted",
             "env_id")

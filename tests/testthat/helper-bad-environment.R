@@ -1,5 +1,5 @@
-# A client of a server with one environment, two numbers to observe and two actions, whose
-# answers are what a test says: `about` are fields of its description.
+# Returns a client of a server whose answers a test chooses. The server has one environment with two
+# numbers to observe and two actions. `...` replaces fields of its description.
 local_bad_environment <- function(..., frame = parent.frame()) {
   about <- list(
     env_id = "Bad-v0",
@@ -16,13 +16,13 @@ local_bad_environment <- function(..., frame = parent.frame()) {
       auto_unbox = TRUE
     )),
     "/v1/envs/0a1b2c3d/" = list(text = jsonlite::toJSON(about, auto_unbox = TRUE)),
-    # Asked for the layout of messages it is one that has no arrays.
+    # The server answers a request for the layout of messages as if there were no arrays.
     "/v1/envs/0a1b2c3d/stream/" = list(text = good_step()),
     "/v1/envs/0a1b2c3d/close/" = list(status = 200, text = "{}")
   ), frame = frame)
 }
 
-# A step's answer; what is given replaces a field, as JSON.
+# Returns a step's answer as JSON. Arguments replace its fields.
 good_step <- function(...) {
   fields <- c(
     observation = "[0,1]", reward = "1.5", done = "false", terminated = "false",

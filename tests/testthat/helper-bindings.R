@@ -1,5 +1,5 @@
-# A function of the package replaced until the test ends. testthat's own
-# local_mocked_bindings() is younger than the testthat that this package runs on.
+# Replaces a function of the package until the test ends. The oldest supported testthat does not
+# have local_mocked_bindings().
 local_binding <- function(name, value, frame = parent.frame()) {
   space <- asNamespace("gym")
   before <- get(name, space)
@@ -19,7 +19,7 @@ local_functions <- function(..., frame = parent.frame()) {
   }
 }
 
-# What a session remembers, kept as it was for other tests.
+# Changes values of the session until the test ends.
 local_session <- function(..., frame = parent.frame()) {
   values <- list(...)
   old <- mget(names(values), envir = the_session, ifnotfound = list(NULL))

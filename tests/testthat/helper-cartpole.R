@@ -1,5 +1,5 @@
-# CartPole written in R, from the equations in gymnasium/envs/classic_control/cartpole.py, once for
-# one pole and once for many.
+# CartPole written in R, by the equations in gymnasium/envs/classic_control/cartpole.py: one version
+# for one pole, and one for many.
 
 cartpole_space <- function() {
   space_box(

@@ -1,10 +1,10 @@
-# What counts of a training, without how long it took, when and where.
+# The parts of a training that must be equal in two runs: not its time, date and machine.
 what_counts <- function(training) {
   training$history$elapsed <- NULL
   training[setdiff(names(training), c("elapsed", "env", "provenance"))]
 }
 
-# Plays a search that writes after each batch, and keeps the file as each write left it.
+# Lets searches write their checkpoint after each batch, and keeps the file of each write.
 local_kept_files <- function(frame = parent.frame()) {
   files <- new.env()
   files$list <- list()

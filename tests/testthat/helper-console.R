@@ -1,12 +1,12 @@
-# An interactive R session in a terminal. Its value has `say(line)` and
-# `await(pattern)`, which waits for what R writes next and returns it up to there.
+# Starts an interactive R session in a terminal. Returns `say(line)`, and `await(pattern)`, which
+# waits until R writes the pattern and returns the output up to there.
 local_console <- function(envvars = character(), frame = parent.frame()) {
   skip_on_os("windows")
   console <- tryCatch(
     processx::process$new(
       file.path(R.home("bin"), "R"), c("--quiet", "--vanilla", "--no-readline"),
       pty = TRUE, pty_options = list(echo = FALSE),
-      # With testthat's own variable rlang takes the session for not interactive.
+      # With testthat's variable, rlang would think that the session is not interactive.
       env = c(
         "current", R_LIBS = paste(.libPaths(), collapse = .Platform$path.sep), TESTTHAT = "",
         GYM_INSTALL = "", GYM_SERVER_URL = "", NO_COLOR = "1", envvars

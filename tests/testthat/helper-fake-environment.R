@@ -1,5 +1,5 @@
-# Environments that need no server, for tests of what is played and drawn. They have
-# what rollout() asks of an environment, and remember what was done to them.
+# Environments that need no server, for tests of play and pictures. They have the methods that
+# rollout() uses, and record their calls.
 
 discrete_space <- function(n = 2L, start = 0L) {
   new_space(list(name = "Discrete", n = n, start = start, dtype = "int64"))
@@ -62,11 +62,11 @@ fake_observation <- function(space, seed, at) {
   if (length(space$shape) > 1L) array(values, space$shape) else values
 }
 
-# The same as a vector environment. It is as strict as the server: with "vector_entry_point" all are
+# The same as a vector environment. It is as strict as the server. With "vector_entry_point" all are
 # reset and stepped together, and the seed of a sub-environment follows from the one seed and its
-# number; otherwise each has a seed of its own, `mask` and `which` pick some, and in mode "SameStep"
-# a list with several seeds for a sub-environment has it begin its next episodes by itself. Where an
-# episode has ended and no other began, no step is taken in mode "Disabled", nor in "SameStep".
+# number. Otherwise each has its own seed, and `mask` and `which` choose some. In mode "SameStep", a
+# sub-environment with several seeds begins its next episodes by itself. After the end of an
+# episode, modes "Disabled" and "SameStep" accept no step until another episode has begun.
 # `messages` counts resets and steps.
 fake_vector_env <- function(num_envs, mode = "sync",
                             autoreset = if (mode == "sync") "Disabled" else "NextStep",
@@ -146,7 +146,7 @@ fake_vector_env <- function(num_envs, mode = "sync",
   env
 }
 
-# Episodes of one step each, with these returns in the order in which they are played.
+# Makes episodes of one step each, with these returns in the order of play.
 scripted_environment <- function(returns, ...) {
   at <- 0L
   fake_environment(
@@ -159,8 +159,9 @@ scripted_environment <- function(returns, ...) {
   )
 }
 
-# A vector environment whose episodes have these returns and lengths, in the order of their numbers,
-# batch after batch: as many to a batch as it has room for. The return comes with the last step.
+# Makes a vector environment whose episodes have these returns and lengths, in the order of their
+# numbers, batch after batch. Each batch has as many episodes as possible. The last step pays the
+# return.
 scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) {
   batch <- -1L
   room <- num_envs * if (mode == "vector_entry_point") 1L else 4L
@@ -183,15 +184,15 @@ scripted_vector_env <- function(num_envs, returns, lengths, mode = "sync", ...) 
     seeds <<- if (is.list(seed)) c(t(vapply(seed, own, numeric(4L)))) else env$seed
     observation
   }
-  # Sub-environments beyond the last episode play along in some modes.
+  # In some modes, sub-environments beyond the last episode play, too.
   beyond <- 10L * num_envs
   returns <- c(returns, numeric(beyond))
   lengths <- c(lengths, rep(1L, beyond))
   env
 }
 
-# For a reward by which weights and seeds make a difference.
+# A reward that depends on the weights and on the seed.
 first_action <- function(seed, step, action) if (step == 1L) 10 * action + seed %% 5 else 0
 
-# For the argument `client`: forced only when something is about to be made.
+# For the argument `client`: a function that evaluates it is about to make something, and fails.
 no_client <- function() stop("something was about to be made")

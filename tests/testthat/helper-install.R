@@ -1,5 +1,5 @@
-# A cache folder of its own, in which nothing is installed, and no Python or uv but those that the
-# tests have anyway. Pythons from the network are not asked for.
+# Sets an empty cache folder until the test ends. Only the Python and uv that the tests already use
+# are found, and no Python is downloaded.
 local_cache <- function(name = "a caché", frame = parent.frame()) {
   python <- Sys.getenv("GYM_PYTHON")
   folder <- withr::local_tempdir(.local_envir = frame)
@@ -14,7 +14,7 @@ local_cache <- function(name = "a caché", frame = parent.frame()) {
   file.path(folder, name)
 }
 
-# One that is named or found, or that the tests' own environment has.
+# The uv that a variable names, that the tests' own environment has, or that is found.
 test_uv <- function() {
   beside <- file.path(dirname(Sys.getenv("GYM_PYTHON")), uv_name())
   if (!nzchar(Sys.getenv("GYM_UV")) && file.exists(beside)) {
@@ -40,9 +40,9 @@ skip_if_no_uv <- function() {
   testthat::skip_if(is.na(Sys.getenv("GYM_UV", NA)), "no uv (GYM_UV names one)")
 }
 
-# An environment as an installation leaves it, but for what is in it.
+# Makes the folders and files of an installation, without its packages.
 fake_installation <- function(extras = character(), hash = lock_hash()) {
-  # Never into the user's own cache.
+  # Never write into the user's own cache.
   stopifnot(startsWith(install_root(), dirname(tempdir())), nzchar(Sys.getenv("R_USER_CACHE_DIR")))
   folder <- file.path(install_root(), hash)
   fake_program(environment_python(folder))
@@ -64,7 +64,7 @@ fake_program <- function(path, ...) {
   path
 }
 
-# A uv that is a shell script: the file `calls` lists its arguments, one call a line.
+# A shell script in place of uv. The file `calls` lists the arguments of each call, one call a line.
 local_fake_uv <- function(..., frame = parent.frame()) {
   testthat::skip_on_os("windows")
   folder <- withr::local_tempdir(.local_envir = frame)

@@ -1,5 +1,4 @@
-# Whole numbers as bit64 and data.table keep them, made without these packages; `x` fits R's
-# integers.
+# Makes an integer64, as bit64 and data.table do, without these packages. `x` must fit R's integers.
 int64 <- function(x) {
   halves <- rbind(as.integer(x), -1L * (as.vector(x) < 0))
   bits <- writeBin(as.integer(halves), raw(), endian = "little")

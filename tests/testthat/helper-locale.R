@@ -1,9 +1,9 @@
 #' Set a locale for the rest of a test
 #'
-#' A machine may lack it: then it is made, and otherwise the test is skipped.
+#' If the machine does not have the locale, it is made. If that fails, the test is skipped.
 #' @param language Such as "de_DE".
-#' @param charset With which it is made, in much less time than with UTF-8.
-#' @return What the locale is called, for `Sys.setlocale()` in another session.
+#' @param charset The charset with which it is made, in much less time than with UTF-8.
+#' @return The name of the locale, for `Sys.setlocale()` in another session.
 #' @noRd
 local_locale <- function(category, language, charset, frame = parent.frame()) {
   before <- Sys.getlocale(category)

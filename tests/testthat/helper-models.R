@@ -1,6 +1,6 @@
 # Models that tests solve and play.
 
-# From state 1 to the left lies 0, an end, to the right 2, and further 3, an end worth 1.
+# States 0 to 3 in a row. The walk ends in 0, or in 3 with a reward of 1.
 walk_table <- function() {
   data.frame(
     state = c(1, 1, 2, 2), action = c(0, 1, 0, 1), next_state = c(0, 2, 1, 3),
@@ -10,14 +10,14 @@ walk_table <- function() {
 
 walk_model <- function(...) gym_model(walk_table(), start = 1, ...)
 
-# One action goes on, with reward, the other ends.
+# The first action goes on for ever, with `reward`. The second one ends the episode.
 endless_model <- function(reward = -1) {
   gym_model(data.frame(
     state = c(0, 0), action = c(0, 1), next_state = c(0, 1), reward = c(reward, 5)
   ), start = 0)
 }
 
-# Each action leads to a few states that are drawn, at a cost that is drawn.
+# Each action leads to a few random states, at a random cost.
 random_table <- function(states, actions, successors) {
   table <- expand.grid(
     way = seq_len(successors), action = seq_len(actions) - 1, state = seq_len(states) - 1

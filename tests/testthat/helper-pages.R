@@ -1,4 +1,4 @@
-# Pages of vignettes/, whose code tests run. They lie in the source tree, or in an installed package
+# Tests run the code of pages in vignettes/. They are in the source tree, or in an installed package
 # that was built with its vignettes.
 
 page_files <- function(pattern) {
@@ -8,7 +8,7 @@ page_files <- function(pattern) {
   if (length(found)) found[[1L]] else character()
 }
 
-# A list of a vignette's chunks of R: each the header's text and the lines of code.
+# Returns a vignette's R chunks, each as its header's text and its lines of code.
 page_chunks <- function(file) {
   lines <- readLines(file, encoding = "UTF-8")
   fences <- grep("^```", lines)

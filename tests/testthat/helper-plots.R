@@ -1,4 +1,4 @@
-# For tests of pictures. What was built is looked at, not pixels.
+# Tests of pictures look at the built plot, not at pixels.
 
 local_device <- function(frame = parent.frame()) {
   grDevices::pdf(NULL)
@@ -21,7 +21,7 @@ layers_of <- function(picture, geom) {
   lapply(which(kinds == geom), function(i) ggplot2::layer_data(picture, i))
 }
 
-# The labels of a picture's key, and nothing where it has none.
+# The labels of a picture's key, or NULL if it has none.
 key_of <- function(picture, aesthetic = "colour") {
   scale <- ggplot2::ggplot_build(picture)$plot$scales$get_scales(aesthetic)
   if (is.null(scale)) NULL else scale$get_labels()

@@ -1,4 +1,4 @@
-# A real nginx before a server, set up by the file in inst/examples.
+# A real nginx in front of a server, with the configuration in inst/examples.
 
 skip_if_no_nginx <- function() {
   for (program in c("nginx", "openssl")) {
@@ -6,7 +6,7 @@ skip_if_no_nginx <- function() {
   }
 }
 
-# A certificate that says it is of gym.example.org.
+# Makes a certificate for gym.example.org.
 make_certificate <- function(folder) {
   run_quietly(Sys.which("openssl"), c(
     "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2",
@@ -16,7 +16,7 @@ make_certificate <- function(folder) {
   file.path(folder, "fullchain.pem")
 }
 
-# The package's file with other places and ports, inside what a distribution's nginx.conf has.
+# Writes the package's file with other paths and ports, inside the usual parts of an nginx.conf.
 write_nginx_conf <- function(folder, port, server_port, keepalive) {
   ours <- readLines(system.file("examples", "nginx.conf", package = "gym"))
   if (!keepalive) {
@@ -44,9 +44,10 @@ write_nginx_conf <- function(folder, port, server_port, keepalive) {
 }
 
 #' Start an nginx before a server
-#' @param keepalive Does it keep connections to the server, as the file says without `--users`?
-#' @return A list of `url`, the `config` of httr's that takes its certificate and its name for this
-#'   machine's, and `folder`, where it writes.
+#' @param keepalive Does nginx keep connections to the server open, as the file advises for a server
+#'   without `--users`?
+#' @return A list of `url`, `config`, with which httr accepts the certificate and finds the name on
+#'   this machine, and `folder`, to which nginx writes.
 #' @noRd
 local_proxy <- function(server, keepalive = TRUE, frame = parent.frame()) {
   skip_if_no_nginx()
@@ -67,7 +68,8 @@ local_proxy <- function(server, keepalive = TRUE, frame = parent.frame()) {
   )
 }
 
-# The same before a server of its own that asks for a token; also returns both, and a client.
+# Starts an nginx in front of a new server that requires a token. Also returns the server, and a
+# client.
 local_proxied_server <- function(frame = parent.frame()) {
   server <- local_locked_server(allow_host = "gym.example.org", frame = frame)
   proxy <- local_proxy(server, frame = frame)
@@ -76,7 +78,7 @@ local_proxied_server <- function(frame = parent.frame()) {
   c(proxy, list(server = server, client = client))
 }
 
-# Waits until nginx has started: before that it does not answer.
+# Waits until nginx answers.
 await_answer <- function(client, seconds = 10) {
   deadline <- Sys.time() + seconds
   repeat {
@@ -88,7 +90,7 @@ await_answer <- function(client, seconds = 10) {
   }
 }
 
-# A step that is taken in half a second, by another process.
+# Lets another process take a step in half a second.
 step_soon <- function(server, instance_id) {
   code <- paste(
     "import json, sys, time, urllib.request",

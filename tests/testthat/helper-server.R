@@ -1,19 +1,19 @@
-# One server for all tests of a file's process, started by the first that needs
-# it; the session's own server, so the session's end stops it.
+# The session's own server, which all tests in this process share. The first test that needs it
+# starts it, and it stops with the session.
 test_client <- function() {
   skip_if_no_server()
   gym_client()
 }
 
-# Whether every test is wanted, as by `make test-all`, and not only those of `make test`.
+# Whether to run every test, as `make test-all` does, and not only those of `make test`.
 tests_all <- function() identical(Sys.getenv("GYM_TEST_ALL"), "true")
 
-# For a test that takes long, beside others that make its main promise.
+# For a test that takes long, if another test proves its main promise.
 skip_unless_all <- function() {
   testthat::skip_if_not(tests_all(), "left to make test-all")
 }
 
-# Whether a part of `make soak` runs, which sets this variable: for what takes minutes to prove.
+# Whether a part of `make soak` runs, which sets this variable. For tests that take minutes.
 soaks <- function(variable) identical(Sys.getenv(variable), "all")
 
 skip_if_no_server <- function() {
@@ -24,12 +24,12 @@ skip_if_no_server <- function() {
 
 # A Python that can run the server.
 working_python <- function() {
-  # First, as it may start the server.
+  # Call this first, because it may start the server.
   client <- test_client()
   the_session$servers[[client$remote_base]]$python
 }
 
-# A server of its own for a test that stops it or needs other options.
+# Starts a server for a test that stops it or needs other options.
 local_server <- function(..., frame = parent.frame()) {
   skip_if_no_server()
   server <- gym_server_start(...)
@@ -45,8 +45,8 @@ local_env <- function(env_id = "CartPole-v1", ..., client = test_client(),
   env
 }
 
-# A server that can make the environments of odd_environments.py and mirror_environments.py: one of
-# its own for a test that stops it or needs other options, and one for all others of a process.
+# Starts a server that can make the environments of odd_environments.py and mirror_environments.py,
+# for a test that stops it or needs other options. All other tests of a process share odd_server().
 local_odd_server <- function(..., frame = parent.frame()) {
   withr::local_envvar(PYTHONPATH = paste(
     c(normalizePath(test_path()), Sys.getenv("PYTHONPATH")), collapse = .Platform$path.sep
@@ -67,7 +67,8 @@ make_odd <- function(name, server) {
   gym_make(paste0("odd_environments:", name, "-v0"), client = server)
 }
 
-# The address of what a script of these tests serves on a free port, which it prints.
+# Runs a script of these tests, which serves on a free port and prints the port. Returns its
+# address.
 local_python_server <- function(script, ..., frame = parent.frame()) {
   process <- processx::process$new(
     working_python(), c(test_path(script), ...), stdin = "|", stdout = "|", stderr = NULL
@@ -81,22 +82,22 @@ local_python_server <- function(script, ..., frame = parent.frame()) {
   paste0("http://127.0.0.1:", port)
 }
 
-# The address of a server that gets stuck; see stalling_server.py.
+# The address of a server that hangs; see stalling_server.py.
 local_stalling <- function(how, frame = parent.frame()) {
   local_python_server("stalling_server.py", how, frame = frame)
 }
 
-# The address of a server that means ill; see bad_server.py.
+# The address of a server with wrong answers; see bad_server.py.
 local_bad_server <- function(..., frame = parent.frame()) {
   local_python_server("bad_server.py", ..., frame = frame)
 }
 
-# A client of a server with canned answers by path; `say()` on the client adds more.
+# A client of a server that has a fixed answer for each path. `say()` adds answers.
 local_canned_server <- function(answers = list(), frame = parent.frame()) {
   file <- withr::local_tempfile(.local_envir = frame)
   writeLines(jsonlite::toJSON(answers, auto_unbox = TRUE), file)
   client <- create_GymClient(local_bad_server("canned", file, frame = frame), timeout = 10)
-  # Its port may be that of a server that an earlier test has started and stopped.
+  # An earlier test may have started and stopped a server on this port.
   the_session$servers[[client$remote_base]] <- NULL
   client$file <- file
   client
@@ -120,7 +121,7 @@ http_client <- function(client = test_client()) {
                    token = token_of(client))
 }
 
-# For another address of a server, or another process.
+# The token of a client's server, for another address of the server or another process.
 token_of <- function(client) if (!is.null(client$token)) client$token()
 
 # The tokens of two users, and a server with one for each of them.
@@ -147,7 +148,7 @@ free_port <- function() {
 }
 
 pid_runs <- function(pid) {
-  # Signal 0 only asks; a zombie waits for its parent, not for us.
+  # Signal 0 only checks the process. A zombie has ended, and only its parent has not noticed yet.
   tools::pskill(pid, 0) &&
     !any(grepl("^State:\\s+Z", tryCatch(
       readLines(file.path("/proc", pid, "status")),
@@ -155,15 +156,15 @@ pid_runs <- function(pid) {
     )))
 }
 
-# Ends a process after some seconds as nothing can prevent, while this one does something else.
+# Kills a process after some seconds, while this one does something else.
 kill_later <- function(pid, seconds, signal = 9L, frame = parent.frame()) {
   code <- sprintf("Sys.sleep(%f); tools::pskill(%d, %d)", seconds, pid, signal)
   killer <- processx::process$new(file.path(R.home("bin"), "Rscript"), c("--vanilla", "-e", code))
   withr::defer(killer$kill(), envir = frame)
 }
 
-# Runs a script in a session of its own, with gym attached and `server` a client of another
-# session's server. Returns what processx::run() does.
+# Runs a script in a new session with gym attached, in which `server` is a client of this session's
+# server. Returns the result of processx::run().
 run_session <- function(server, ..., timeout = 60) {
   script <- withr::local_tempfile(lines = c(
     paste0(".libPaths(", deparse1(.libPaths()), ")"),
@@ -187,7 +188,7 @@ local_token_file <- function(text = token_text, frame = parent.frame()) {
   file
 }
 
-# A server that asks for it, as it says so.
+# Starts a server that requires the token.
 local_locked_server <- function(..., frame = parent.frame()) {
   local_server(token_file = local_token_file(frame = frame), ..., frame = frame)
 }

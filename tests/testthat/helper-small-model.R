@@ -1,5 +1,5 @@
-# A model with three states and two actions, whose values solve_mdp() knows; a policy that acted in
-# it, and one to evaluate.
+# A model with three states and two actions, whose values solve_mdp() computes, a policy that acted
+# in the model, and a policy to evaluate.
 small_model <- function() {
   gym_model(data.frame(
     state = c(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2), action = c(0, 0, 1, 1),
@@ -12,7 +12,8 @@ behaves <- rbind(c(0.5, 0.5), c(0.4, 0.6), c(0.6, 0.4), c(0.5, 0.5))
 wanted <- rbind(c(0.3, 0.7), c(0.6, 0.4), c(0.4, 0.6), c(1, 0))
 by_table <- function(p) function(states) p[states[[1L]] + 1, ]
 
-# Actions of several parts: what pays is the state, and twice the state.
+# Actions with two parts. The first is rewarded if it equals the state, the second if it equals
+# twice the state.
 spaces_of_parts <- list(
   space_multi_discrete(2:3), space_tuple(space_discrete(2), space_discrete(3)),
   space_dict(left = space_discrete(2), right = space_discrete(3))

@@ -95,7 +95,7 @@ test_that("the title names every environment", {
 test_that("what cannot be compared is refused", {
   played <- played_with(1:3)
   refused <- function(code, text) expect_error(code, text, class = "gym_error_argument")
-  refused(plot(played, "trajectory"), "must be a result as the others, or have a name")
+  refused(plot(played, "trajectory"), "must be a result like the others, or have a name")
   refused(plot(a = played, b = played, type = "trajectory"), "shows one rollout, not 2")
   refused(autoplot(played, played, type = "filmstrip"), "A filmstrip shows one rollout, not 2")
 })

@@ -175,7 +175,7 @@ test_that("a larger budget goes on where a smaller one has ended", {
   expect_message(
     train_agent(agent_ars(), fake_environment(reward = first_action), iterations = 3, target = Inf,
                 seed = 1, eval_episodes = 4, eval_every = 3, checkpoint = path),
-    "had ended", class = "gym_message_resumed"
+    "has already ended", class = "gym_message_resumed"
   )
   more <- play(6, path)
   at_once <- play(6, NULL)
@@ -192,15 +192,15 @@ test_that("a file of something else is refused", {
     expect_error(quiet_training(..., iterations = 2, checkpoint = path), message, fixed = TRUE,
                  class = "gym_error_checkpoint")
   }
-  refused("0.05 there, and CEM: population 40", agent_cem())
-  refused("noise 0.05 there, and ARS V2-t: directions 8, top 4, step_size 0.02, noise 0.1 here",
+  refused("0.05 in the file, and CEM: population 40", agent_cem())
+  refused("0.05 in the file, and ARS V2-t: directions 8, top 4, step_size 0.02, noise 0.1 here",
           agent_ars(noise = 0.1))
-  refused("`env` is Fake-v0 there, and Other-v0 here.", agent_ars(),
+  refused("`env` is Fake-v0 in the file, and Other-v0 here.", agent_ars(),
           env = fake_environment(id = "Other-v0"))
-  refused("`seed` is 1 there, and 2 here.", agent_ars(), seed = 2)
-  refused("`episodes` is 1 there, and 3 here.", agent_ars(), episodes = 3)
+  refused("`seed` is 1 in the file, and 2 here.", agent_ars(), seed = 2)
+  refused("`episodes` is 1 in the file, and 3 here.", agent_ars(), episodes = 3)
   expect_error(
-    search_random(fake_environment(), checkpoint = path), "is that of a training", fixed = TRUE,
+    search_random(fake_environment(), checkpoint = path), "belongs to a training", fixed = TRUE,
     class = "gym_error_checkpoint"
   )
 })

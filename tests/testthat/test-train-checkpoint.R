@@ -128,18 +128,19 @@ test_that("arguments that differ from the file's are named, with both values", {
     expect_identical(cnd$argument, argument)
     expect_s3_class(cnd, "gym_error_argument")
   }
-  refused(rounds = 4, argument = "rounds", message = "`rounds` is 3 there, and 4 here.")
-  refused(episodes = 5, argument = "episodes", message = "`episodes` is 2 there, and 5 here.")
-  refused(target = 7, argument = "target", message = "`target` is Inf there, and 7 here.")
-  refused(max_steps = 9, argument = "max_steps", message = "`max_steps` is NULL there, and 9 here.")
-  refused(seed = 2, argument = "seed", message = "`seed` is 1 there, and 2 here.")
+  refused(rounds = 4, argument = "rounds", message = "`rounds` is 3 in the file, and 4 here.")
+  refused(episodes = 5, argument = "episodes", message = "`episodes` is 2 in the file, and 5 here.")
+  refused(target = 7, argument = "target", message = "`target` is Inf in the file, and 7 here.")
+  refused(max_steps = 9, argument = "max_steps",
+          message = "`max_steps` is NULL in the file, and 9 here.")
+  refused(seed = 2, argument = "seed", message = "`seed` is 1 in the file, and 2 here.")
   refused(policy = policy_network(c(4, 1)), argument = "policy", message = "`policy` is network")
   refused(env = fake_environment(id = "Other-v0"), argument = "env",
-          message = "`env` is Fake-v0 there, and Other-v0 here.")
+          message = "`env` is Fake-v0 in the file, and Other-v0 here.")
   refused(env = fake_vector_env(3), argument = "env",
           message = "Fake-v0 with 3 sub-environments here")
   refused(env = gym_wrap("Fake-v0", "TimeLimit", max_episode_steps = 5), argument = "env",
-          message = "`env` is another there.")
+          message = "`env` is a different one in the file.")
   refused(seed = 2, rounds = 4, argument = c("rounds", "seed"), message = "`seed`")
   # What has no part in the result may differ, and so may weights that are not played.
   expect_s3_class(play(policy = policy_network(), seed = 1L, progress = FALSE), "gym_search")
@@ -314,7 +315,7 @@ test_that("a search says that it goes on, and how far the file is, or that it ha
   }
   path <- local_checkpoint()
   expect_no_condition(play(path), class = "gym_message_resumed")
-  expect_message(play(path), "had ended", class = "gym_message_resumed")
+  expect_message(play(path), "has already ended", class = "gym_message_resumed")
   half <- local_checkpoint(kept$list[[3]])
   expect_message(play(half), "after 2 of 4 rounds", class = "gym_message_resumed")
 })

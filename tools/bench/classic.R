@@ -1,5 +1,5 @@
-# The classic pattern, by our own hand: httr for each call, content() and fromJSON() for each
-# answer. `server` is the address of the development server.
+# The classic pattern, written for the benchmark: httr for each call, content() and fromJSON() for
+# each answer. `server` is the address of the development server.
 
 classic_post <- function(server, route, data) {
   response <- httr::POST(httr::modify_url(server, path = route), body = data, encode = "json")
@@ -22,10 +22,10 @@ classic_step <- function(server, instance_id, action, render = FALSE) {
   )
 }
 
-# Rounds of the post's script ("Artificial Intelligence in R (I)", 2018) in the post's own way:
-# a data frame that grows by a row each step, neurons one at a time. Left out is its end at the
-# first round that reaches 195; tanh() and plogis() are what its package sigmoid computes.
-# Returns how many steps were played.
+# Plays rounds as the tutorial's script ("Artificial Intelligence in R (I)", 2018) does: a data
+# frame grows by a row each step, and neurons are computed one at a time. Unlike the script, it does
+# not stop at the first round that reaches 195. tanh() and plogis() replace the package sigmoid.
+# Returns the number of steps.
 classic_rounds <- function(server, instance_id, rounds, episodes = 5, max_steps = 200) {
   steps <- 0
   neurons <- 2

@@ -1,11 +1,11 @@
-# The contenders in steps a second: for each what it is, how it is called, and a function
-# that plays a turn. Environments are made at once and kept for all turns.
+# The contenders in steps a second. Each has a name, a way to call it, and a function that plays a
+# turn. Environments are made at the start and kept for all turns.
 
 contender <- function(part, num_envs, name, called, play) {
   list(part = part, num_envs = num_envs, name = name, called = called, play = play)
 }
 
-# How reticulate is named with the NumPy of the server, and with one that it converts.
+# The names of reticulate with the server's NumPy, and with a NumPy that it converts.
 reticulate_name <- function(worker) {
   paste0("reticulate, NumPy ", sub("[.].*", "", ask(worker, "versions")$NumPy))
 }
@@ -70,7 +70,7 @@ vector_contenders <- function(setup, num_envs) {
   )
 }
 
-# Of the ways to call it the fastest: the best of some tries, in which they take turns.
+# Finds the fastest way to call it: the best of some tries, in which the ways take turns.
 reticulate_vector <- function(worker, num_envs, mode) {
   forms <- ask(worker, "forms vector")
   tries <- replicate(5L, vapply(seq_along(forms), function(form) {
@@ -82,7 +82,7 @@ reticulate_vector <- function(worker, num_envs, mode) {
   })
 }
 
-# Turn by turn: in each all of them, every second time in the other direction.
+# In each turn all contenders play. Every second turn has the opposite order.
 play_turns <- function(contenders, turns, seconds) {
   for (contender in contenders) contender$play(seconds / 4)
   orders <- lapply(seq_len(turns), function(turn) {

@@ -1,7 +1,7 @@
-# What processes have used of the processor, and what R calculates with. Only on Linux, which shows
-# times in /proc.
+# The CPU time of processes, and R's library of linear algebra. Needs Linux, which shows times in
+# /proc.
 
-# The seconds that all threads of some processes have run.
+# The CPU seconds of all threads of some processes.
 cpu_seconds <- function(pids) {
   files <- Sys.glob(file.path("/proc", pids, "task", "*", "schedstat"))
   times <- vapply(files, function(file) {
@@ -12,7 +12,7 @@ cpu_seconds <- function(pids) {
   sum(times) / 1e9
 }
 
-# The processes that a process has started, and those that these have.
+# The processes that a process has started, and those that they have started.
 descendants <- function(pid) {
   table <- utils::read.table(text = system2("ps", c("-eo", "pid=,ppid="), stdout = TRUE))
   found <- pid
@@ -27,7 +27,7 @@ descendants <- function(pid) {
 
 server_pid <- function(client) gym:::get_answer(client, "/v1/health/")$pid
 
-# Debian's OpenBLAS is a libblas.so.3, too, in a folder that says so.
+# Debian's OpenBLAS is also called libblas.so.3, in a folder with its own name.
 name_of_blas <- function(file = extSoftVersion()[["BLAS"]]) {
   folder <- basename(dirname(file))
   paste(c(if (grepl("blas", folder)) folder, basename(file)), collapse = ": ")

@@ -1,5 +1,5 @@
-# Learning from logged steps: batch Q-learning against a plain loop of Python's with a NumPy table,
-# in swept rows for a second of the processor's; and what takes the processor how long.
+# Learning from logged steps: compares batch Q-learning with a plain Python loop and a NumPy table,
+# in rows per CPU second, and measures the CPU time of other methods.
 
 data_names <- c(
   gym = "gym, learn_q(data)", python = "Python, NumPy table", lm = "gym, learn_fitted_q(), lm",

@@ -1,5 +1,5 @@
-# Whole episodes by rollout() against Python's own loop, environment by environment, and what a step
-# takes beside the bare exchange of its bytes.
+# Draws two comparisons: whole episodes by rollout() with Python's own loop, for each environment,
+# and the time of a step with that of the bare exchange of its bytes.
 
 draw_environments <- function(rows, run, file) {
   grDevices::png(file, width = 1330, height = 735, res = 119)
@@ -17,7 +17,7 @@ draw_environments <- function(rows, run, file) {
 gym_colour <- "#D55E00"
 reticulate_colour <- "#0072B2"
 
-# The ratios of one line of the left panel: of gym, and of reticulate where it plays.
+# The ratios of one line of the left panel: of gym, and of reticulate if it plays.
 rollout_line <- function(rows, label, part, env_id, goal) {
   of <- function(name) values_of(rows, part, name, env_id = env_id)
   python <- of("Python")

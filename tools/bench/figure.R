@@ -1,5 +1,5 @@
-# Env steps a second against sub-environments: the contenders, the limit and what a single
-# environment gives.
+# Draws steps a second by the number of sub-environments: the contenders, the limit, and single
+# environments.
 
 # Okabe and Ito's colours, and how each contender is drawn.
 figure_styles <- function(reticulates) {
@@ -22,7 +22,7 @@ draw_figure <- function(rows, run, file) {
   on.exit(grDevices::dev.off())
   graphics::par(mar = c(4, 5.5, 2.5, 1), las = 1, mgp = c(3.2, 0.7, 0))
   sizes <- sort(unique(curves$num_envs))
-  # Single environments stand to the left of one sub-environment.
+  # Points of single environments are to the left of one sub-environment.
   single_at <- 0.3
   graphics::plot(
     NA, log = "xy", xlim = c(single_at, max(sizes)), ylim = range(summary_range(curves, single)),

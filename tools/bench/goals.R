@@ -1,4 +1,4 @@
-# The goals that the bench is held against.
+# The goals of the benchmark.
 
 goal <- function(text, value, at_least = NULL, at_most = NULL, digits = 3) {
   data.frame(
@@ -89,7 +89,7 @@ search_goals <- function(rows) {
 
 # Whole episodes ----------------------------------------------------------------------
 
-# Turn by turn, how many times as many steps a second as another contender.
+# For each turn, the ratio of its steps a second to those of another contender.
 rollout_ratios <- function(rows, env_id, other, part = "env_rollouts") {
   values_of(rows, part, rollout_names[["gym"]], env_id = env_id) / other
 }
@@ -112,7 +112,7 @@ rollout_goals <- function(rows) {
   )
 }
 
-# Steps a second with the NumPy that is the faster one over all turns.
+# Steps a second with the NumPy that is faster over all turns.
 faster_reticulate <- function(rows, env_id) {
   rates <- lapply(reticulates(rows), function(name) {
     values_of(rows, "env_rollouts", name, env_id = env_id)
@@ -151,7 +151,7 @@ beside_goals <- function(rows) {
 
 # The step ---------------------------------------------------------------------------
 
-# The median of how many times as long one takes as the other, turn by turn.
+# The median over the turns of the ratio of their times.
 step_ratio <- function(rows, name, num_envs, other, other_envs = num_envs) {
   took <- function(name, num_envs) values_of(rows, "wire", wire_names[[name]], num_envs)
   stats::median(took(name, num_envs) / took(other, other_envs))
@@ -175,7 +175,7 @@ wire_goals <- function(rows) {
 
 # Memory -----------------------------------------------------------------------------
 
-# Beyond this many MB a process counts as grown.
+# A process has grown if it needs more than this many additional MB.
 noise <- 5
 
 memory_goals <- function(rows) {
@@ -193,7 +193,7 @@ memory_goals <- function(rows) {
 
 # Gradients --------------------------------------------------------------------------
 
-# A training that failed has taken infinitely long: what counts are the medians of both.
+# A training that failed counts as infinitely long. The medians of both are compared.
 gradient_goals <- function(rows) {
   gradients <- rows[rows$part == "gradients", ]
   kinds <- unique(gradients[c("env_id", "unit")])

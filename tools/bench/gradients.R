@@ -1,23 +1,24 @@
-# PPO in R against Stable-Baselines3, turn by turn, each with one seed: the processor's seconds of a
-# step, and those until the last 100 episodes of a training have a mean return. Both have the same
-# settings, so that a step is followed by as many updates of as many rows.
+# Compares PPO in R with Stable-Baselines3, turn by turn, each with one seed: the CPU seconds of a
+# step, and those until the last 100 episodes of a training reach a mean return. Both have the same
+# settings, and so the same updates per step.
 #
-# Optional, as torch is large. GYM_SB3_PYTHON names a Python that has it:
+# Optional, because torch is large. GYM_SB3_PYTHON names a Python that has it:
 #
 #   python3 -m venv sb3 && sb3/bin/pip install stable-baselines3 'gymnasium[box2d]'
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS=gradients
 #
-# All of it takes hours. An environment's id among PARTS measures that one alone, turns=N and
-# seeds=N measure less, and the rows of what is not measured stay in the file: so do those by R's
-# reference BLAS beside those by OpenBLAS (LD_PRELOAD=/usr/lib/.../libopenblas.so.0 changes it).
+# All of it takes hours. To measure only one environment, give its id among PARTS. turns=N and
+# seeds=N measure less. Rows that are not measured again stay in the file, and rows with R's
+# reference BLAS stay beside those with OpenBLAS (LD_PRELOAD=/usr/lib/.../libopenblas.so.0 selects
+# it).
 #
 #   GYM_SB3_PYTHON=sb3/bin/python make bench PARTS='gradients LunarLander-v3 turns=5 seeds=0'
 
 gradient_names <- c(gym = "gym, learn_ppo()", sb3 = "Stable-Baselines3, PPO")
 
-# The settings of rl-baselines3-zoo (hyperparams/ppo.yml), but half as many rows for LunarLander:
-# with its 16,384 most trainings of both failed. `target` is the mean return of 100 episodes, `cap`
-# the steps at which a training has failed.
+# The settings of rl-baselines3-zoo (hyperparams/ppo.yml), but half as many rows for LunarLander,
+# because with 16,384 most trainings of both failed. `target` is the mean return of 100 episodes. A
+# training has failed if it does not reach it in `cap` steps.
 gradient_tasks <- list(
   "CartPole-v1" = list(
     num_envs = 8, rows = 256, batch = 256, epochs = 20, discount = 0.98, lambda = 0.8,
@@ -32,10 +33,10 @@ gradient_tasks <- list(
 # JSON has no infinity.
 out_of_reach <- 1e9
 
-# As many steps of each are timed, so that an update of LunarLander is among them.
+# This many steps of each are timed, enough for an update of LunarLander.
 timed_steps <- c("CartPole-v1" = 10000, "LunarLander-v3" = 33000)
 
-# What the arguments leave of the scale.
+# The environments, turns and seeds that the arguments choose.
 chosen_scale <- function(arguments) {
   number <- function(name) {
     given <- grep(paste0("^", name, "="), arguments, value = TRUE)
@@ -51,7 +52,7 @@ chosen_scale <- function(arguments) {
   Filter(Negate(is.null), chosen)
 }
 
-# The rows of what was measured before, and is not in these.
+# The rows of earlier runs that are not measured again.
 with_earlier <- function(rows, file) {
   what <- function(rows) paste(rows$env_id, rows$unit)
   earlier <- if (file.exists(file)) read_results(file)$rows
@@ -59,7 +60,7 @@ with_earlier <- function(rows, file) {
   rows[order(rows$env_id, rows$unit, method = "radix"), ]
 }
 
-# R's products of matrices are the slower ones of its own BLAS unless another one was chosen.
+# Unless another BLAS was chosen, R multiplies matrices by its own, which is slower.
 gradient_label <- function(env_id) {
   if (grepl("openblas", name_of_blas(), ignore.case = TRUE)) env_id else paste0(env_id, reference)
 }
@@ -80,7 +81,7 @@ sb3_versions <- function() {
 }
 
 compare_gradients <- function(python, scale) {
-  # One thread each: torch's is set by the worker.
+  # Each uses one thread. The worker sets this for torch.
   client <- gym_server_start(python = python, token = FALSE)
   worker <- start_sb3()
   on.exit({
@@ -111,7 +112,7 @@ gradient_task <- function(env_id, seed, ...) {
   utils::modifyList(c(task, list(env_id = env_id, seed = seed, total_steps = task$cap)), list(...))
 }
 
-# Without a target, for so many steps.
+# Trains for so many steps, without a target.
 timed_task <- function(env_id, seed, steps) {
   gradient_task(env_id, seed, target = out_of_reach, total_steps = steps)
 }

@@ -1,6 +1,6 @@
-# Learns what it is asked to by the installed gym, which may be an older one: reads the names of
-# tasks and answers each line with the steps and the processor's seconds of R and server, and the
-# seconds that passed, in JSON.
+# Learns with the installed gym, which may be an older one. Reads the names of tasks and answers
+# each line with the steps, the CPU seconds of R and the server, and the seconds that passed, as
+# JSON.
 suppressMessages(library(gym))
 source("tools/bench/cpu.R")
 
@@ -30,7 +30,7 @@ server <- server_pid(gym_client())
 used <- function() cpu_seconds(c(Sys.getpid(), server, descendants(server)))
 input <- file("stdin", "r")
 while (length(name <- readLines(input, 1L))) {
-  # The first time the model is fetched, and code is compiled.
+  # The first call gets the model and compiles code, so it is not timed.
   set.seed(1)
   before <- used()
   passed <- system.time(learned <- suppressMessages(learner_tasks[[name]]()))[["elapsed"]]

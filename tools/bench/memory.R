@@ -1,9 +1,9 @@
-# What a client's million env steps leave behind in R and in its server, and what many
-# sub-environments cost the server. A process of its own; prints a line "WHAT: MB" each.
+# Measures how much memory R and its server need after a million steps, and how much many
+# sub-environments need. Runs in its own process and prints lines "WHAT: MB".
 
 library(gym)
 
-# Resident memory; ps is not everywhere on Linux, /proc nowhere else.
+# Resident memory. Some Linux systems have no ps, and only Linux has /proc.
 megabytes <- function(pid) {
   status <- file.path("/proc", pid, "status")
   kilobytes <- if (file.exists(status)) {
@@ -26,7 +26,7 @@ play_thousand <- function(env, vector_env, actions) {
   for (i in seq_len(9L)) vector_env$step(actions[[1L + i %% 2L]])
 }
 
-# Of R also what lives.
+# For R, also the memory of objects in use.
 tell_sizes <- function(server_pid, steps) {
   living <- sum(gc()[, 2L])
   after <- paste("after", format(steps, big.mark = ",", scientific = FALSE), "steps")
@@ -35,7 +35,7 @@ tell_sizes <- function(server_pid, steps) {
   tell(paste("server", after), megabytes(server_pid))
 }
 
-# R collects garbage only when its heap is full: it is filled once before anything counts.
+# R collects garbage only when its heap is full, so fill it once before measuring.
 fill_heap <- function() {
   for (i in seq_len(5e5)) list(i, raw(256), numeric(100), raw(1000), raw(3000))
 }
@@ -52,7 +52,7 @@ actions <- list(rep_len(0:1, 100L), rep_len(1:0, 100L))
 told <- unique(pmin(c(10, 100, 1000), million / 1000))
 for (thousand in seq_len(million / 1000)) {
   play_thousand(env, vector_env, actions)
-  # What lives too long for R's small collections, and no longer, would count as growth.
+  # R's small collections leave some garbage behind, which would count as growth.
   if (thousand %% 100 == 0) gc()
   if (thousand %in% told) tell_sizes(server_pid, thousand * 1000)
 }

@@ -12,7 +12,7 @@ import numpy as np
 
 
 def learn(env_id: str, steps: int, seed: int) -> float:
-    """Learn from so many steps, and return the processor's seconds that it took."""
+    """Learn from so many steps, and return the CPU seconds."""
     env = gymnasium.make(env_id)
     rng = np.random.default_rng(seed)
     q = np.zeros((env.observation_space.n, env.action_space.n))

@@ -1,5 +1,5 @@
-# Environments written in R: steps a second of rollout(), without a server, in the CartPole of the
-# tests, of functions for one pole and of functions for all poles at once.
+# Environments written in R: steps a second of rollout(), without a server, in the tests' CartPole,
+# by functions for one pole and by functions for all poles at once.
 
 r_env_names <- c(
   scalar = "rollout(), an environment in R",

@@ -9,7 +9,7 @@ measured <- function(part, num_envs, contender, called, turn, value, unit,
   )
 }
 
-# The data file: a table, before it what is known of the run as comments.
+# The data file: comments about the run, then a table.
 write_results <- function(rows, run, file) {
   con <- file(file, "w", encoding = "UTF-8")
   on.exit(close(con))
@@ -34,7 +34,8 @@ values_of <- function(rows, part, contender, num_envs = 0, unit = NULL, env_id =
   found$value[order(found$turn)]
 }
 
-# Turn by turn, what is better by how many times; what was measured once stands for each turn.
+# For each turn, how many times better the first is. A value that was measured once counts for all
+# turns.
 ratios <- function(gym, other, unit) {
   if (unit %in% c("s", "microseconds")) other / gym else gym / other
 }
@@ -59,7 +60,7 @@ summarise <- function(rows) {
     ratio <- NA
     if (!is.na(reference) && reference != key$contender && key$unit != "steps") {
       gym <- values_of(rows, key$part, reference, key$num_envs, key$unit, key$env_id)
-      # Where both failed there is no ratio.
+      # If both failed, there is no ratio.
       ratio <- stats::median(ratios(gym, values, key$unit), na.rm = TRUE)
     }
     called <- rows$called[rows$part == key$part & rows$contender == key$contender &

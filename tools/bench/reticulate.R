@@ -1,5 +1,5 @@
-# The contender reticulate: a process of its own, as one R process takes one Python.
-# Reads one line a turn and answers with one, env steps a second (or what was asked for):
+# The contender reticulate, in its own process, because an R process can use only one Python. Reads
+# one line a turn and answers with one: env steps a second (or the requested value):
 #
 #   versions                            as JSON
 #   forms KIND                          the ways to call it, KIND is single or vector
@@ -14,8 +14,8 @@ gymnasium <- import("gymnasium")
 numpy <- import("numpy", convert = FALSE)
 builtins <- import_builtins()
 
-# reticulate 1.28 makes R arrays of the arrays of NumPy 1 and leaves those of NumPy 2 as they
-# are: then the results are converted here, as an R user has to.
+# reticulate 1.28 converts arrays of NumPy 1 and leaves those of NumPy 2 as they are. These are
+# converted here, as an R user would have to.
 converts <- is.numeric(import("numpy")$zeros(2L))
 
 # Through a Python list.
@@ -34,7 +34,7 @@ by_bytes <- function(x) {
   if (x$ndim >= 2L) array(values, unlist(x$shape)) else values
 }
 
-# A single sub-environment has a row, too.
+# A single sub-environment is also a matrix, with one row.
 numpy_actions <- function(actions) numpy$array(actions, dtype = "int64", ndmin = 1L)
 
 single_forms <- list(
@@ -45,8 +45,7 @@ single_forms <- list(
   }
 )
 
-# Of a batch of actions what is made beforehand and what in each step, and how the results
-# become R's.
+# How a batch of actions is prepared and passed in each step, and how results become R's.
 vector_form <- function(prepare, send, read) list(prepare = prepare, send = send, read = read)
 
 vector_forms <- if (converts) {
@@ -102,13 +101,13 @@ play_vector_form <- function(form, seconds, num_envs, mode) {
   )
 }
 
-# Steps a second of sub-environments that are stepped together, the policy in R. A step that only
-# begins the next episode of a sub-environment is none of its own.
+# Steps a second of sub-environments that are stepped together, with the policy in R. A step that
+# only begins the next episode of a sub-environment does not count.
 play_episodes <- function(env_id, seconds, num_envs) {
   task <- tasks[[env_id]]
   env <- environment_of(env_id, function() make_task(task, as.integer(num_envs)))
   policy <- policy_of(task, env)
-  # Of few numbers a Python list is the faster way.
+  # For few numbers a Python list is faster.
   read <- if (converts) identity else function(x) if (x$size > 1024L) by_bytes(x) else by_list(x)
   step <- env$step
   observation <- read(env$reset()[[1L]])
@@ -127,7 +126,7 @@ play_episodes <- function(env_id, seconds, num_envs) {
   }
 }
 
-# Of a matrix as its numbers, because reticulate 1.28 makes no arrays of NumPy 2.
+# Passes the numbers of a matrix, because reticulate 1.28 cannot make arrays of NumPy 2.
 numpy_batch <- function(actions) {
   if (is.integer(actions)) {
     return(numpy$array(actions, dtype = "int64"))

@@ -1,5 +1,5 @@
-# Whole episodes by rollout(), with an environment that is named by its id, against Python's own
-# loop over one environment and against reticulate. All of them may use two cores.
+# Compares whole episodes by rollout(), with an environment given by its id, with Python's own loop
+# over one environment and with reticulate. All may use two cores.
 
 rollout_cores <- 2L
 
@@ -13,8 +13,8 @@ rollout_names <- c(
   memory = "server and processes, above an idle server"
 )
 
-# Evaluates code while this process, and whatever it starts, may use these cores only. Where the
-# system has no such limit all cores are used.
+# Evaluates code while this process, and all that it starts, may use these cores only. If the system
+# has no such limit, all cores are used.
 on_cores <- function(count, code) {
   allowed <- parallel::mcaffinity()
   if (length(allowed) > count) {
@@ -24,7 +24,7 @@ on_cores <- function(count, code) {
   force(code)
 }
 
-# How many cores that leaves; without such a limit, all that there are.
+# How many cores may be used.
 count_cores <- function() {
   allowed <- length(parallel::mcaffinity())
   if (allowed) min(allowed, rollout_cores) else parallel::detectCores()
@@ -58,8 +58,8 @@ stop_contenders <- function(setup) {
   gym_server_stop(setup$client)
 }
 
-# Turn by turn, every second time in the other direction, after each has been tried once. `play()`
-# of a contender gives steps a second.
+# After a first try of each, all play in each turn. Every second turn has the opposite order.
+# `play()` of a contender returns steps a second.
 play_paired <- function(contenders, turns, what) {
   for (contender in contenders) contender$warm_up()
   do.call(rbind, lapply(seq_len(turns), function(turn) {
@@ -88,7 +88,7 @@ rollout_contenders <- function(setup, task, episodes) {
       paired("env_rollouts", task, rollout_names[["gym"]],
              sprintf("rollout(id, policy, %d)", episodes),
              function() rate_of(play),
-             # As many episodes, so that all worker processes run, but short ones.
+             # Play as many episodes, so that all worker processes run, but short ones.
              function() play(max_steps = 2)),
       paired("env_rollouts", task, rollout_names[["python"]],
              sprintf("env.step(a) in a loop, %d episodes", episodes),
@@ -143,7 +143,7 @@ reticulate_episodes <- function(worker, task) {
          function() play(2), function() play(0.1))
 }
 
-# An iteration of a search: 16 candidates, 2 episodes each. Short, so a turn has several.
+# An iteration of a search: 16 candidates, 2 episodes each. It is short, so a turn has several.
 candidate_contenders <- function(setup, task, candidates = 16L, episodes = 2L, iterations = 10L) {
   numbers <- lapply(seq_len(candidates), function(seed) task_numbers(task, seed))
   weights <- do.call(rbind, lapply(numbers, function(one) coef(task_policy(task, one))))
@@ -158,7 +158,7 @@ candidate_contenders <- function(setup, task, candidates = 16L, episodes = 2L, i
   }
   list(
     paired("candidates", task, rollout_names[["gym"]], called, function() rate_of(play)),
-    # The same steps again and again: the rate of several iterations is that of one.
+    # All iterations play the same steps, so their common rate is that of one.
     paired("candidates", task, rollout_names[["python"]], called, function() {
       mean(replicate(iterations, loop(episodes)))
     })

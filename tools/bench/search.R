@@ -1,8 +1,8 @@
-# Seconds of a random search: the same number of rounds in the post's own way and by
-# search_random(), and one from a fresh R session on.
+# Seconds of a random search: the same number of rounds by the tutorial's script and by
+# search_random(), and one search that starts with a new R session.
 
-# The post's way takes minutes: it is played once, in as many pieces as search_random() has
-# turns, one before each of them.
+# The tutorial's script takes minutes, so it is played once, in as many pieces as search_random()
+# has turns. One piece comes before each turn.
 compare_searches <- function(setup, turns, rounds) {
   id <- classic_create(setup$development$url, "CartPole-v0")
   set.seed(1)
@@ -33,7 +33,7 @@ search_rows <- function(name, turn, rounds, took) {
   )
 }
 
-# From the start of the process on: library(gym), the server's start, the search.
+# From the start of the process: library(gym), the server's start, the search.
 fresh_searches <- function(turns) {
   do.call(rbind, lapply(seq_len(turns), function(turn) {
     progress("search in a fresh R, turn ", turn, " of ", turns)

@@ -8,7 +8,7 @@ import sys
 
 
 async def pass_on(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, delay: float) -> None:
-    """Pass on what comes, each piece so many seconds after it came."""
+    """Pass on each piece of data so many seconds after it came."""
     loop = asyncio.get_running_loop()
     pieces: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue()
 

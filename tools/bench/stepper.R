@@ -1,5 +1,5 @@
-# A build of the package as a contender of the part "stream": a process of its own, with the library
-# that R_LIBS names first. Reads one line a turn and answers with one, microseconds a step or
+# A build of the package as a contender of the part "stream", in its own process, from the library
+# that R_LIBS names first. Reads one line a turn and answers with one: microseconds a step, or
 # seconds:
 #
 #   step ENV_ID NUM_ENVS STEPS    env$step(), NUM_ENVS 0 for a single environment
@@ -27,7 +27,7 @@ prepared <- function(env_id, num_envs) {
   made[[key]]
 }
 
-# A block of steps has one reset, which is not counted.
+# A block of steps begins with a reset, which is not timed.
 time_blocks <- function(steps, reset, step) {
   took <- numeric()
   for (block in seq_len(ceiling(steps / 8))) {

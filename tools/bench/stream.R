@@ -1,11 +1,11 @@
-# This build against another one, such as that of an earlier commit, which is installed into a
-# library of its own:
+# Compares this build with another one, such as that of an earlier commit, which is installed in
+# another library:
 #
 #   GYM_BENCH_LIBRARY=/path/to/library make bench PARTS=stream
 #
-# Each is a process with a server of its own, and they take turns.
+# Each runs in its own process with its own server, and they take turns.
 
-# What is measured, see stepper.R: the times as fast that this build should be.
+# For each measurement of stepper.R, how many times as fast this build should be.
 stream_tasks <- list(
   list("step CartPole-v1 0 160", "env$step()", 2.7),
   list("classic CartPole-v1 0 160", "env_step()", 2.5),

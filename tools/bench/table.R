@@ -18,7 +18,7 @@ what_text <- function(summary) {
   ifelse(summary$part %in% by_id, summary$env_id, text)
 }
 
-# The parts of a run, each group a table of its own.
+# The parts of a run. Each group has its own table.
 table_groups <- list(
   CartPole = c("single", "vector", "r_env", "search", "fresh", "memory"),
   environments = c("env_rollouts", "candidates", "beside"),
@@ -58,7 +58,7 @@ goal_lines <- function(rows) {
   ), right = "measured")
 }
 
-# What stands between two dollars would be mathematics.
+# Markdown would read text between two dollar signs as mathematics.
 calls_as_code <- function(text) gsub("([a-z_]+[$]?[a-z_]*\\(\\))", "`\\1`", text)
 
 code <- function(text) ifelse(nzchar(text), paste0("`", text, "`"), "")

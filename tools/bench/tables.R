@@ -1,12 +1,12 @@
-# Learners of tables: from the model in R against a plain loop of Python's with a NumPy table; on
-# the server, and whole episodes, also against an older gym, where GYM_OLD names a checkout of it
-# that was set up:
+# Learners of tables. Compares learning from the model in R with a plain Python loop and a NumPy
+# table. Also measures learning on the server and from whole episodes, and compares an older gym, if
+# GYM_OLD names a checkout of it that was set up:
 #
 #   git worktree add ../old e8cd8bf && (cd ../old && tools/setup test)
 #   GYM_OLD=../old make bench PARTS=tables
 #
-# R steps a table where Python steps an environment. Steps are those of a second of the processor's,
-# R's and the server's together.
+# R plays in a table, and Python in an environment. Results are steps per CPU second of R and the
+# server together.
 
 table_names <- c(
   gym = "gym, learn_q()", python = "Python, NumPy table", server = "gym, on the server",
@@ -48,7 +48,7 @@ compare_tables <- function(python, turns, blackjack_turns) {
     })
     do.call(rbind, c(by_id, on_server))
   }
-  # What is done for the first time is not counted.
+  # The first run is not counted.
   for (learner in learners) ask(learner, "server")
   rows <- do.call(rbind, lapply(seq_len(turns), steps_of))
   blackjack <- lapply(seq_len(blackjack_turns), function(turn) {
@@ -64,7 +64,7 @@ compare_tables <- function(python, turns, blackjack_turns) {
   do.call(rbind, c(list(rows), blackjack, pages))
 }
 
-# The processor's seconds of the code of all chapters that both checkouts may have.
+# The CPU seconds of the code of all chapters that both checkouts have.
 page_seconds <- function(folder) {
   code <- paste(
     "started <- proc.time();",

@@ -1,5 +1,6 @@
-# The environments that are played by their ids, and the policy in each: the same numbers for R and
-# for Python, which reads them from files. Sourced by the bench and by its worker with reticulate.
+# The environments that are played by their ids, and the policy in each. R and Python use the same
+# numbers, which Python reads from files. The benchmark and its worker with reticulate source this
+# file.
 
 # The kinds of policies: `discrete` takes the action with the largest output, `box` stretches
 # tanh() of each output to the action's bounds, `random` draws.
@@ -11,9 +12,9 @@ task <- function(env_id, kind, inputs = 0L, outputs = 0L, episodes = 512L, quick
   )
 }
 
-# `goal` is how many times as fast as Python's loop rollout() is to be. Pong plays fewer episodes
-# than the others, because one takes most of a second in Python; a quick run fewer of all that
-# are long, and more of those that are short.
+# `goal` is how many times as fast as Python's loop rollout() should be. Pong has fewer episodes
+# than the others, because one takes most of a second in Python. A quick run plays fewer long
+# episodes, and more short ones.
 tasks <- list(
   task("LunarLander-v3", "discrete", 8L, 4L, quick = 128L, goal = 1.6, reticulate = TRUE),
   task("BipedalWalker-v3", "box", 24L, 4L, quick = 64L, goal = 1.6, reticulate = TRUE),
@@ -30,8 +31,8 @@ tasks <- list(
 )
 names(tasks) <- vapply(tasks, function(task) task$env_id, "")
 
-# What the policy of a task has: a matrix with a row for each output, nothing for a random one.
-# Drawn by a seed, so that every process and every run has the same.
+# The numbers of a task's policy: a matrix with a row for each output, nothing for a random policy.
+# A seed draws them, so that every process and every run has the same.
 task_numbers <- function(task, seed = 1L) {
   set.seed(seed, "Mersenne-Twister", "Inversion", "Rejection")
   if (task$kind == "random") {

@@ -1,5 +1,5 @@
-# How every contender in R is timed, in the bench's own process and in its workers: a turn
-# plays CartPole with alternating actions for some seconds and gives env steps a second.
+# Times every contender in R, in the benchmark's own process and in its workers. A turn plays
+# CartPole with alternating actions for some seconds and returns steps a second.
 
 now <- function() proc.time()[["elapsed"]]
 
@@ -20,8 +20,8 @@ play_single <- function(reset, step, seconds) {
   }
 }
 
-# `step(actions)` moves all sub-environments, which begin their next episodes by themselves;
-# `actions` are two batches made beforehand.
+# `step(actions)` steps all sub-environments, which begin their next episodes by themselves.
+# `actions` are two batches that were made before.
 play_vector <- function(num_envs, actions, step, seconds) {
   steps <- 0
   started <- now()

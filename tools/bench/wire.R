@@ -1,5 +1,5 @@
-# Microseconds of a step of CartPole through env$step(), and of a handle of curl that exchanges the
-# same bytes and knows nothing of environments: what R's own calls add.
+# Measures what R's own calls add to a step: the microseconds of a step of CartPole through
+# env$step(), and of a curl handle that only exchanges the same bytes.
 
 wire_names <- c(
   gym = "gym, env$step()", parsed = "bare handle, read and checked", bare = "bare handle"
@@ -60,11 +60,11 @@ step_contender <- function(num_envs, name, called, play) {
 
 # The clock -----------------------------------------------------------------------
 
-# From a reset on no pole falls for so many steps with alternating actions. What resets costs is
+# With alternating actions, no pole falls for this many steps after a reset. The time of resets is
 # not counted.
 steps_to_reset <- 8L
 
-# Microseconds that a step takes; `prepare()` is not timed, `step(i)` takes the ith step after it.
+# The microseconds of a step. `prepare()` is not timed. `step(i)` takes the ith step after it.
 time_steps <- function(steps, prepare, step) {
   took <- 0
   blocks <- ceiling(steps / steps_to_reset)
@@ -92,10 +92,10 @@ start_recorder <- function(python, client) {
   start_worker(python, c("tools/bench/recorder.py", port))
 }
 
-# An environment that a client has made and stepped by way of the recorder, with both actions, and
-# what it takes to send such steps to the server itself.
+# Makes an environment, takes steps with both actions through the recorder, and returns what is
+# needed to send such steps directly to the server.
 bare_step <- function(client, recorder, num_envs) {
-  # A header of httr's keeps the steps on HTTP.
+  # With a header of httr, steps go by HTTP.
   by_way <- create_GymClient(
     sprintf("http://127.0.0.1:%d", ask(recorder, "port")), config = httr::add_headers(By = "HTTP")
   )
@@ -105,7 +105,7 @@ bare_step <- function(client, recorder, num_envs) {
     env$step(actions)
     ask(recorder, "last")
   })
-  # With a key of the bench's own.
+  # Use the benchmark's own key.
   path <- sub("^POST (\\S+)[?]key=[^&]*(\\S+) .*", "\\1?key=bench\\2", requests[[1L]]$head)
   bare <- new.env()
   bare$env <- env
@@ -120,8 +120,8 @@ bare_step <- function(client, recorder, num_envs) {
   bare
 }
 
-# Setting a body on a handle takes as long as half a request, so curl asks for it and only its size
-# is set, where it changes.
+# Setting a body on a handle takes as long as half a request. So curl reads it from a function, and
+# only its size is set if it changes.
 exchange <- function(bare, body) {
   if (length(body) != bare$size) {
     bare$size <- length(body)
@@ -142,7 +142,7 @@ next_chunk <- function(bare, nbytes) {
   chunk
 }
 
-# Those that curl does not write by itself.
+# The headers that curl does not write by itself.
 recorded_headers <- function(head) {
   lines <- strsplit(trimws(head), "\r\n", fixed = TRUE)[[1L]][-1L]
   headers <- stats::setNames(as.list(sub("^[^:]*: *", "", lines)), sub(":.*", "", lines))
@@ -156,7 +156,7 @@ numbered_message <- function(message, number) {
   message
 }
 
-# The bodies are made beforehand.
+# The bodies are made before the clock starts.
 play_bare_steps <- function(bare, steps, read) {
   bodies <- NULL
   time_steps(
@@ -178,7 +178,7 @@ check_status <- function(response) {
   }
 }
 
-# What a careful client of a few lines does with the answer.
+# Reads the answer as a careful client of a few lines would.
 read_step <- function(response) {
   check_status(response)
   numbers <- readBin(c(raw(4L), response$content), "double", 17L, endian = "little")

@@ -1,5 +1,5 @@
-# Processes that the bench starts: contenders that play a turn when they are asked to, and
-# the development server of the classic pattern. All end with the bench.
+# Processes that the benchmark starts: contenders that play a turn on request, and the development
+# server of the classic pattern. All end with the benchmark.
 
 start_worker <- function(command, arguments, env = character()) {
   log <- tempfile("bench-")
@@ -9,7 +9,7 @@ start_worker <- function(command, arguments, env = character()) {
   list(process = process, log = log)
 }
 
-# Put a line to a worker and wait for the one that it answers.
+# Sends a line to a worker and waits for its answer.
 ask <- function(worker, ...) {
   worker$process$write_input(paste0(paste(...), "\n"))
   repeat {
@@ -37,8 +37,8 @@ start_reticulate <- function(numpy, python) {
   )
 }
 
-# The server on Flask's development server, which closes each connection: what the classic
-# client had to talk to.
+# The server on Flask's development server, which closes each connection, as the classic client's
+# server did.
 start_development_server <- function(python) {
   script <- c(
     "from gym_server.api.app import create_app",

@@ -1,10 +1,10 @@
-# Gymnasium's Blackjack-v1 as a model, by which what was learned there is judged exactly: an
-# infinite deck, a dealer who sticks at 17, and a natural that wins unless the dealer has one, too
-# (sab = TRUE, as Gymnasium registers it).
+# Gymnasium's Blackjack-v1 as a model, which evaluates learned policies exactly: an infinite deck, a
+# dealer who sticks at 17, and a natural that wins unless the dealer has one, too (sab = TRUE, as
+# Gymnasium registers it).
 #
 # A state is a row of the table of observations (the sum, the dealer's card, a usable ace), counted
-# from 0. The observation does not tell a natural from 21 in more cards, so that naturals are states
-# of their own, from 704 on, in which the policy acts as at 21.
+# from 0. The observation does not distinguish a natural from 21 with more cards. So naturals are
+# separate states, from 704 on, in which the policy acts as at 21.
 
 chance <- c(rep(1, 9), 4) / 13
 
@@ -21,7 +21,7 @@ with_card <- function(hand, card) {
   }
 }
 
-# How likely the dealer ends with each sum from 1 to 21, or above 21, the last one.
+# The probability that the dealer ends with each sum from 1 to 21, or (the last one) above 21.
 dealer_ends <- function(hand) {
   ends <- numeric(22)
   if (hand[[1L]] >= 17) {

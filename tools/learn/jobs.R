@@ -1,7 +1,7 @@
-# What the table of learners has: how each learns, what it is to reach, and on how many seeds. The
-# settings were chosen on the seeds 1 to 99; what is reported are the seeds from 1001 on.
+# The trainings in the table of learners: their settings, their targets and the number of seeds. The
+# settings were chosen with seeds 1 to 99. The table reports seeds from 1001 on.
 #
-# `judge` returns the expected return of what was learned: exact where the environment has a model,
+# `judge` returns the expected return of the learned policy: exact if the environment has a model,
 # otherwise the mean of 100 fresh episodes.
 
 by_training <- function(learned) learned$final$mean_return

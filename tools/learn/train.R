@@ -1,5 +1,5 @@
-# Learns one seed of a job of the table of learners, in a process of its own:
-# Rscript tools/learn/train.R ENV_ID SEED FILE. FILE gets the table's row.
+# Trains one seed of a job of the table of learners, in its own process: Rscript tools/learn/train.R
+# ENV_ID SEED FILE. It writes the table's row to FILE.
 suppressMessages(library(gym))
 source("tools/learn/blackjack.R")
 source("tools/learn/jobs.R")

@@ -1,4 +1,4 @@
-# One of the clients of clients.py: plays what the file describes and writes down what it observes.
+# One of the clients of clients.py. It plays what the file describes and records its observations.
 #
 #   Rscript clients.R PORT FILE
 

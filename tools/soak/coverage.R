@@ -1,11 +1,12 @@
-# How often intervals of evaluate_offline() cover the exact value, and how far estimates are off.
+# Measures how often intervals of evaluate_offline() cover the exact value, and the errors of its
+# estimates.
 #
 #   Rscript tools/soak/coverage.R [DATASETS [SECONDS]]
 #
-# Data sets of 200 episodes are drawn from a model whose values solve_mdp() knows, as many as asked
-# for, or as fit into the time. It prints the table of vignettes/which-treatment.Rmd. A * marks rows
-# of which theory says that the interval covers: it fails if one of these lies outside of the
-# interval in which the shares of all of them would lie in 99 of 100 studies.
+# Draws data sets of 200 episodes from a model whose values solve_mdp() computes, as many as
+# requested, or as the time allows. Prints the table of vignettes/which-treatment.Rmd. A * marks
+# rows whose intervals should cover by theory. In 99 of 100 studies, all of their shares would lie
+# in a certain interval. The script fails if one lies outside of it.
 
 library(gym)
 arguments <- as.numeric(commandArgs(TRUE))
@@ -17,7 +18,7 @@ discount <- 0.9
 source("tests/testthat/helper-small-model.R")
 model <- small_model()
 
-# One rollout plays the episodes of all data sets.
+# A single rollout plays the episodes of all data sets.
 played <- rollout(
   model, policy_table(log(behaves), temperature = 1), episodes = asked * episodes, seed = 1,
   steps = TRUE
@@ -26,7 +27,7 @@ data <- split(played, (played$episode - 1L) %/% episodes)
 
 weighted <- c("is", "wis", "pdis", "dr", "wdr")
 wrong <- "5 steps, wrong regression"
-# A fit in each replicate is slow, so there are fewer of them.
+# Each replicate fits a model, which is slow, so there are fewer replicates.
 settings <- list(
   list("to the end", method = "fqe", replicates = 200, expected = "fqe"),
   list("to the end", method = weighted, expected = c("dr", "wdr")),

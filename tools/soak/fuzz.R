@@ -1,5 +1,5 @@
-# The package's tensor reader on bytes that are nearly right: it reads them or says in words why
-# not, in time and without more memory than the bytes are worth.
+# Tests the package's reader of tensors with bytes that are nearly right. It must read them or raise
+# an error with a message, in time and without more memory than such bytes need.
 #
 #   tools/in-env Rscript tools/soak/fuzz.R SECONDS
 
@@ -11,7 +11,7 @@ tensor <- function(dtype, shape) {
   list(dtype = dtype, shape = shape, bytes = as.raw(sample(0:1, size, replace = TRUE)))
 }
 
-# Files such as a server sends, and the parts of headers from which others are made.
+# Files as a server sends them, and parts of headers from which other files are made.
 right_files <- function() {
   shapes <- list(integer(), 1L, 3L, c(2L, 3L), 0L, c(2L, 2L, 2L))
   files <- lapply(seq_len(40), function(i) {
@@ -34,7 +34,7 @@ mutate <- function(bytes) {
   for (i in seq_len(sample(1:4, 1))) {
     n <- length(bytes)
     if (n < 2) break
-    # Most often in the header: that is where the decisions are.
+    # Change the header most often, because it determines how the rest is read.
     at <- if (runif(1) < 0.8) sample(min(n, 300), 1) else sample(n, 1)
     bytes <- switch(
       sample(7, 1),
@@ -50,7 +50,7 @@ mutate <- function(bytes) {
   if (runif(1) < 0.5) fit_header(bytes) else bytes
 }
 
-# Say the header's length anew, so that more is looked at than that.
+# Write the new length of the header, because with a wrong length nothing else is read.
 fit_header <- function(bytes) {
   end <- which(bytes == as.raw(0x7d))
   if (!length(end) || length(bytes) < 10) return(bytes)
@@ -59,11 +59,12 @@ fit_header <- function(bytes) {
   replace(bytes, 1:8, writeBin(c(as.integer(size), 0L), raw(), endian = "little"))
 }
 
-# Put another number, or what is none, into the header, and leave all else right.
+# Put another number, or something that is not a number, into the header, and leave the rest as it
+# is.
 swap_value <- function(bytes) {
   size <- gym:::header_size(bytes)
   header <- rawToChar(bytes[8 + seq_len(size)])
-  # Of its values: what stands between brackets, or is a dtype.
+  # Choose a value of the header: a text between brackets, or a dtype.
   value <- "(?<=[\\[,])[0-9]+(?=[],])|\"[A-Z]+[0-9]+\"|[[][0-9,]*[]]"
   places <- gregexpr(value, header, perl = TRUE)
   if (places[[1]][[1]] < 0) return(bytes)
@@ -82,7 +83,7 @@ odd_values <- c(
   "[1,1,1,1,1,1,1,1,1]", "1E400", "\"\"", "[{}]"
 )
 
-# Seconds of this process's own: others may have the machine.
+# Use the CPU seconds of this process, because other processes may be running.
 worked <- function() sum(proc.time()[c("user.self", "sys.self")])
 
 seconds <- as.numeric(commandArgs(TRUE)[[1]])
@@ -96,7 +97,7 @@ while (Sys.time() < end && length(problems) < 20) {
   bytes <- seeds[[sample(length(seeds), 1)]]
   bytes <- if (runif(1) < 0.5) swap_value(bytes) else mutate(bytes)
   began <- worked()
-  # Anew, and with the table that it knows.
+  # Read it as a new file, and with a table that is already known.
   for (time in 1:2) {
     outcome <- tryCatch(read_tensors(bytes), error = identity, warning = identity)
     if (inherits(outcome, "condition") && !inherits(outcome, "gym_error")) {

@@ -1,6 +1,6 @@
-# R sessions that are killed with -9 at a random moment of a checkpointed search on a server of
-# their own: no process is left behind, the file is whole, and in the end the result is that of
-# an undisturbed search.
+# Kills R sessions with -9 at a random moment of a search with a checkpoint, on their own servers.
+# Afterwards no process may be left, the file must be whole, and the final result must be that of an
+# uninterrupted search.
 #
 #   tools/in-env Rscript tools/soak/kill-r.R [MOMENTS]      20 by default, some five minutes
 
@@ -23,7 +23,7 @@ writeLines(c(
   "saveRDS(search, args[[2]])"
 ), script)
 
-# Everything that such a session starts carries the mark.
+# Every process that such a session starts has this mark.
 start_session <- function(mark) {
   env <- stats::setNames("1", mark)
   processx::process$new(
@@ -32,11 +32,11 @@ start_session <- function(mark) {
   )
 }
 
-# In the form of those of ps_mark_tree(), which would mark this session too.
+# The mark has the form of those of ps_mark_tree(), which would also mark this session.
 new_mark <- function(number) sprintf("PS%08d_%d", number, as.integer(Sys.time()))
 
 marked <- function(mark) {
-  # Those that have ended wait for the machine's first process to notice.
+  # Leave out zombies: they have ended, but the first process of the machine has not noticed it yet.
   Filter(function(one) {
     !identical(tryCatch(ps::ps_status(one), error = function(cnd) "zombie"), "zombie")
   }, ps::ps_find_tree(mark))
@@ -56,7 +56,8 @@ play_out <- function() {
   mark <- new_mark(0L)
   session <- start_session(mark)
   session$wait(2000)
-  # The session and its server: else nothing would be found that is left behind either.
+  # Both the session and its server must be found. Otherwise a process that is left behind would not
+  # be found either.
   if (session$is_alive() && !length(marked(mark))) stop("the marks of processes are not seen")
   session$wait()
   if (session$get_exit_status() != 0L) stop("the session that nobody kills failed")
@@ -73,7 +74,7 @@ while (killed < moments) {
   session <- start_session(mark)
   session$wait(seconds * runif(1) * 1000)
   if (session$is_alive()) {
-    # Not its server, which R's own way to end a process would end as well.
+    # Kill the session alone. R's own way to end a process would also end its server.
     tools::pskill(session$get_pid(), tools::SIGKILL)
     session$wait()
     killed <- killed + 1L

@@ -1,5 +1,5 @@
-# A server that is killed with -9 at a random moment of a checkpointed search: the same call,
-# with another server, comes to the result of an undisturbed search.
+# Kills a server with -9 at a random moment of a search with a checkpoint. The same call, with
+# another server, must have the result of an uninterrupted search.
 #
 #   tools/in-env Rscript tools/soak/kill-server.R [MOMENTS]      50 by default, some ten minutes
 
@@ -26,7 +26,7 @@ kill_after <- function(server, seconds) {
   )
 }
 
-# How many episodes the file has.
+# The number of episodes in the file.
 episodes_kept <- function() {
   if (!file.exists(path)) return(0L)
   sum(vapply(gym:::read_checkpoint(path, NULL)$training$episodes, NROW, 0L))
@@ -42,12 +42,12 @@ while (killed < moments) {
   killer$wait()
   server <- gym_server_start()
   if (inherits(search, "gym_search")) {
-    # It came too late.
+    # The search had already ended.
     next
   }
   if (!inherits(search, "gym_error_connection")) stop(search)
   killed <- killed + 1L
-  # What is played again is at most the batch under way, of which some rounds had ended.
+  # At most the current batch is played again. Some of its rounds may have ended already.
   lost <- lost + (NROW(search$result$episodes) - episodes_kept() > 16L)
   same <- identical(figures(play(server, checkpoint = path)), figures(undisturbed))
   equal <- equal + same

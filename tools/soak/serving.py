@@ -17,7 +17,7 @@ SERVER = Path(__file__).resolve().parents[2] / "inst" / "server"
 
 
 class ServerProcess:
-    """A server of its own that ends with this process, however that ends."""
+    """A server that ends with this process, however that ends."""
 
     def __init__(self, *arguments: str, **variables: str) -> None:
         """Start it, with additional environment variables, and wait until it listens."""
