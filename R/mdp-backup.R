@@ -95,8 +95,8 @@ numbered_transitions <- function(model) {
 action_values <- function(backup, values, discount) {
   if (is.null(backup$flow)) {
     ahead <- values[backup$next_state]
-    # Infinity times the probability 0 would be NaN.
-    if (any(is.infinite(values))) ahead[backup$weight == 0] <- 0
+    # Infinity or NaN times the probability 0 would be NaN.
+    if (!all(is.finite(values))) ahead[backup$weight == 0] <- 0
     ahead <- .rowSums(backup$weight * ahead, nrow(backup$weight), ncol(backup$weight))
   } else {
     ahead <- times(backup$flow, values)

@@ -217,6 +217,16 @@ test_that("what comes once does not decide the sign of what comes for ever", {
   expect_identical(unname(solve_mdp(both, policy = rep(0, 3))$values), c(NaN, Inf, -Inf))
 })
 
+test_that("an undefined value makes no value undefined of a state that never gets there", {
+  moves <- data.frame(
+    state = c(0, 1, 2, 3, 3), action = 0, next_state = c(1, 0, 4, 2, 4),
+    probability = c(1, 1, 1, 0.5, 0.5), reward = c(1, -1, 2, 4, 4)
+  )
+  moves$terminated <- moves$next_state == 4
+  solved <- solve_mdp(gym_model(moves, start = 2), policy = policy_random())
+  expect_identical(unname(solved$q[, 1]), c(NaN, NaN, 2, 5, -Inf))
+})
+
 test_that("a policy that draws its actions is not taken for one that does not", {
   draws <- function(state) sample(0:1, length(state), replace = TRUE)
   expect_error(evaluate_policy(walk_model(), draws), "draws its actions",
