@@ -42,7 +42,7 @@
 #' @param discount The factor by which a reward counts less with each step, a number above 0 and at
 #'   most 1, the default.
 #' @param horizon The number of steps after which everything ends, a whole number. `NULL`, the
-#'   default, sets no such number.
+#'   default, sets no horizon.
 #' @param method `"value_iteration"`, the default, or `"policy_iteration"`. Ignored with a policy or
 #'   a horizon.
 #' @param trace Keep the values after each sweep? `FALSE`, the default, or `TRUE`.

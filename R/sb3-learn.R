@@ -84,9 +84,9 @@
 #' @param policy The policy's name in Stable-Baselines3, a string. The default is the preset's, or
 #'   `"MlpPolicy"`.
 #' @param env_kwargs The arguments of the environment, a list with names.
-#' @param num_envs The number of sub-environments, a whole number. The default is the preset's, or
-#'   1. One process steps them one after another (Atari games in threads). The network gets all
-#'   their observations together.
+#' @param num_envs The number of sub-environments, a whole number. By default it is the
+#'   preset's number, or one without a preset. One process steps them one after another (Atari games
+#'   in threads). The network gets all their observations together.
 #' @param normalize Normalise observations and rewards by `VecNormalize`? `FALSE`, the default,
 #'   `TRUE`, or a list of its arguments, such as `list(norm_reward = FALSE)`. The log and all
 #'   evaluations show the original rewards.
