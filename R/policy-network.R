@@ -53,10 +53,10 @@
 #' [Stable-Baselines3](https://stable-baselines3.readthedocs.io/en/master/guide/vec_envs.html).
 #'
 #' @param sizes The numbers of inputs, of neurons in each hidden layer, and of outputs: whole
-#'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial: 4 x 2
-#'   + 2 x 1 = 10 weights. The first and the last may be `NA`. The environment then determines them;
-#'   for two actions there is a single output. In this case the weights are drawn when the policy is
-#'   first played, from a seed that is drawn now.
+#'   numbers, at least two of them. The default, `c(4, 2, 1)`, is the network of the tutorial, which
+#'   has 10 weights (4 x 2 + 2 x 1). The first and the last may be `NA`. The environment then
+#'   determines them; for two actions there is a single output. In this case the weights are drawn
+#'   when the policy is first played, from a seed that is drawn now.
 #' @param activation The names of the activations: one for the hidden layers and one for the outputs
 #'   (the default, `c("tanh", "logistic")`, as in the tutorial), or one for each layer after the
 #'   inputs: `"tanh"`, `"logistic"`, `"identity"` (no change), `"Gompertz"`, `"ReLU"` or
