@@ -8,34 +8,34 @@
 #' call in an interactive session asks once whether to start a server there, as [gym_server_start()]
 #' does. In a script the first call fails, and the error says how to start a server.
 #'
-#' Steps and resets of an environment go by a stream, a WebSocket of the environment's own, which
-#' takes a third of the time of an HTTP request. A session has 32 at most, for the environments that
-#' it uses most. Steps go by HTTP where there can be no stream: with https, a proxy, settings of
-#' httr or a `timeout` of less than a second, and after another process has stepped the same
-#' environment. Printing a client says which way its steps go. Results are the same.
+#' Steps and resets of an environment use a stream: each environment has its own WebSocket, which
+#' takes a third of the time of an HTTP request. A session has at most 32 streams, for the
+#' environments that it used last. Steps use HTTP if there can be no stream: with https, a proxy,
+#' settings of httr or a `timeout` of less than a second, and after another process has stepped the
+#' same environment. The results are the same. Print a client to see which way its steps go.
 #'
-#' You can save a client with [saveRDS()], send it to another process and use it in a forked one.
-#' Each copy opens its own connection.
+#' You can save a client with [saveRDS()], send it to another process, or use it in a forked
+#' process. Each copy opens its own connection.
 #'
 #' Calls that change something on the server (creating, resetting, stepping, closing) carry an
 #' idempotency key. If a connection breaks before the answer arrives, the client repeats the call
-#' with the same key. The server then returns its first answer and does nothing twice.
+#' with the same key. The server then returns its first answer again and does nothing twice.
 #'
-#' The server must be this package's. On the original gym-http-api server, creating an environment
-#' raises a `gym_error_http` with code `not_supported`.
+#' The client needs the server of this package. With the original gym-http-api server, creating an
+#' environment raises a `gym_error_http` with code `not_supported`.
 #'
 #' @param remote_base The server's address, a string such as `"http://127.0.0.1:5000"`.
 #' @param timeout The time after which a call fails with `gym_error_connection`, in seconds. The
-#'   default is 60. Up to 10 seconds of it are for connecting.
+#'   default is 60. Connecting may take at most 10 seconds of this time.
 #' @param config Further settings for the connection, made with httr: [httr::authenticate()],
 #'   [httr::add_headers()], [httr::use_proxy()] or several of them joined by [c()]. Settings made by
 #'   [httr::set_config()] before a call also apply, except for a proxy if the server is on this
 #'   machine.
 #' @param token The token that the server requires, a string; `NULL` or `""` for none. The default
 #'   is the server's own token if this session started it, and otherwise the environment variable
-#'   `GYM_SERVER_TOKEN`, which keeps the token out of scripts. It is sent with each call, to this
-#'   server only. Printing and errors never show it. A saved client contains it, so keep such a file
-#'   secret.
+#'   `GYM_SERVER_TOKEN`, which keeps the token out of scripts. The client sends it with each call,
+#'   only to this server. Printing and errors never show it. A saved client contains it, so keep
+#'   such a file secret.
 #' @return An object of class `GymClient`, a list with the element `remote_base`.
 #' @section Errors: `gym_error_argument` if the address is not an http or https URL, the timeout is
 #'   not a positive number or the token is not a string of visible ASCII characters. The first call
@@ -75,7 +75,7 @@ create_GymClient <- function(remote_base, timeout = 60, config = httr::config(),
 
 #' Send a request to any route of the server
 #'
-#' Use these building blocks of the classic client for routes without a function of their own.
+#' These are building blocks of the classic client. Use them for routes that have no R function.
 #' `get_request()` reads; `post_request()` changes something on the server.
 #'
 #' @inheritParams env_create
@@ -141,7 +141,7 @@ query_text <- function(data) {
 #'   is not JSON.
 #' @export
 #' @examplesIf gym:::can_start_server()
-#' # One that asks for no token, as httr would have to send it.
+#' # This server requires no token, so httr need not send one.
 #' server <- gym_server_start(token = FALSE)
 #' response <- httr::GET(paste0(server$remote_base, "/v1/envs/"))
 #' parse_server_error_or_raise_for_status(response)

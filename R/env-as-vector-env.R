@@ -1,16 +1,17 @@
 #' Convert an environment to a vector environment to play in
 #'
-#' All functions that play step by step use this interface: [rollout()] and every search call it,
-#' and use nothing else of an environment. Write a method for your own class to let all of them
-#' play another kind of environment.
+#' Functions that play step by step, such as [rollout()] and every search, use an environment only
+#' through this interface. Write a method for your own class, and all of them can play it.
 #'
-#' An environment given by its id is made, and closed by `$close()`. It gets 256 sub-environments.
-#' It gets fewer if observations are large, so that all together take at most a mebibyte, but at
-#' least 16. It gets none if a wrapper remembers something over episodes (`NormalizeObservation`,
-#' `NormalizeReward`). If the server cannot make that many, it makes a quarter of them, 16, or a
-#' single environment. Gymnasium's vector implementation is used if it plays the same game.
-#' Otherwise each sub-environment has its own seed, and the server divides them among processes if
-#' that is faster. An environment that was made before is used as it is, and stays open.
+#' If you give an id, the function makes the environment, and `$close()` closes it. The environment
+#' has 256 sub-environments. It has fewer if observations are large: all observations together take
+#' at most a mebibyte, but there are at least 16 sub-environments. It is a single environment if a
+#' wrapper remembers earlier episodes (`NormalizeObservation`, `NormalizeReward`). If the server
+#' cannot make that many sub-environments, the function tries a quarter of the number, then 16, then
+#' a single environment. It uses Gymnasium's vector implementation if that plays the same game.
+#' Otherwise each sub-environment has its own seed, and the server divides the sub-environments
+#' among processes if that is faster. An environment that you made before is used as it is, and
+#' stays open.
 #'
 #' @param x The environment: an id such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]), an
 #'   environment made by [gym_make()] or [gym_env()], or any list or environment with functions
@@ -19,18 +20,18 @@
 #' @param num_envs The number of sub-environments to make, a whole number of at least 1. `NULL`, the
 #'   default, chooses. An environment that was made before keeps its number.
 #' @param num_workers The number of processes that run the sub-environments, a whole number: 0 for
-#'   the server's own process. `NULL`, the default, lets the server choose, and uses none for
-#'   fewer than 32 episodes (`max_envs`). The result does not depend on it. Only if the environment
-#'   is given by its id and has no vector implementation of its own.
+#'   the server's own process. `NULL`, the default, lets the server choose, and uses none for fewer
+#'   than 32 episodes (`max_envs`). The results do not depend on it. Use it only for an environment
+#'   given by its id that has no vector implementation of its own.
 #' @param ... Arguments of the environment, by name, if it is given by its id.
-#' @param max_envs The largest number of sub-environments if `num_envs` is `NULL` and each has its
-#'   own seed, a number. By default there is no limit.
+#' @param max_envs The largest number of sub-environments to choose, a number, if `num_envs` is
+#'   `NULL` and each sub-environment has its own seed. By default there is no limit.
 #' @param frames Keep frames? `FALSE`, the default, or `TRUE`, which uses one sub-environment.
 #' @param client The client of the server that makes an environment given by its id. The default is
 #'   the session's client, [gym_client()].
 #' @return An object of class `gym_vector_env`, a list with the elements
 #'   \describe{
-#'     \item{observation_space, action_space}{Those of one sub-environment.}
+#'     \item{observation_space, action_space}{The spaces of one sub-environment.}
 #'     \item{spec}{A list of `id` (a string), `reward_threshold`, `max_episode_steps` and
 #'       `render_fps` (numbers or `NULL`).}
 #'     \item{num_envs}{The number of sub-environments, an integer.}
@@ -39,36 +40,35 @@
 #'       reset together. `FALSE` if each has its own seed.}
 #'     \item{begins_next}{`TRUE` if a sub-environment starts its next episode itself in the step
 #'       that ends an episode, as long as it has seeds. `FALSE` or `NULL` if it must be reset.}
-#'     \item{endless}{`TRUE` if it is known that no episode ever ends; it can then be played with
-#'       `max_steps` only. Otherwise `FALSE` or `NULL`.}
+#'     \item{endless}{`TRUE` if it is known that no episode ever ends; playing it then requires
+#'       `max_steps`. Otherwise `FALSE` or `NULL`.}
 #'     \item{possible}{For a model, a logical matrix of the valid actions, with a row for each state
 #'       and a column for each action; otherwise `NULL`.}
 #'     \item{reset(seeds, which)}{A function that starts episodes and returns the first
 #'       observations, a row for each. With `one_seed`, it resets all sub-environments and `seeds`
 #'       is one whole number. Otherwise it resets the sub-environments with the numbers `which`, in
 #'       increasing order, with a seed for each. With `begins_next`, `seeds` may also be a list with
-#'       a vector of seeds for each: the first for now, the others for the episodes that it starts
-#'       itself.}
+#'       a vector of seeds for each sub-environment. The first seed is for this episode, the others
+#'       are for the episodes that the sub-environment starts itself.}
 #'     \item{step(action, which)}{A function that steps the sub-environments with the numbers
 #'       `which`. `action` has a row for each of these, and so has the result, a list of
 #'       `observation`, `reward`, `terminated`, `truncated` and `next_observation`, the observation
-#'       after the step. `observation` is the same, unless the step also started another episode: it
-#'       is then the first observation of that episode.}
+#'       after the step. `observation` equals `next_observation`, unless the step also started
+#'       another episode. Then it is the first observation of that episode.}
 #'     \item{step_bare(action, which)}{As `step()`, without `next_observation`, if that is faster;
 #'       otherwise `NULL`.}
 #'     \item{frame()}{A function that returns the current frame as the bytes of a PNG file; `NULL`
 #'       without `frames`.}
-#'     \item{remembers}{The names of wrappers that remember something over episodes, strings. All
-#'       episodes are then in one batch.}
-#'     \item{env}{The environment that it plays, with the functions `reset()` and `step()` of
-#'       [gym_make()], which return infos; `NULL` if there is none, as for several sub-environments
-#'       in R.}
+#'     \item{remembers}{The names of the wrappers that remember earlier episodes, strings. If there
+#'       are any, all episodes are in one batch.}
+#'     \item{env}{The environment itself, whose `reset()` and `step()` also return infos, as those
+#'       of [gym_make()]. `NULL` if there is no such object, as for several sub-environments in R.}
 #'     \item{client}{The client of the server, or `NULL`.}
-#'     \item{close(wait)}{A function that closes what was made here, and nothing else; with
-#'       `wait = FALSE` without waiting for the server.}
+#'     \item{close(wait)}{A function that closes the environment if `as_vector_env()` made it. With
+#'       `wait = FALSE`, it does not wait for the server.}
 #'   }
-#' @section Errors: `gym_error_argument` for an object that is not an environment. As for
-#'   [gym_make()] if an environment is made.
+#' @section Errors: `gym_error_argument` for an object that is not an environment. If it makes an
+#'   environment, also the errors of [gym_make()].
 #' @seealso [rollout()]
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -88,7 +88,8 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
   check_environment(x)
   check_one_framed(num_envs, frames)
   check_count(num_workers, min = 0, allow_null = TRUE)
-  if (is_registered(x)) {
+  given <- given_id(x)
+  if (given$registered) {
     check_for_r(x, list(num_workers = num_workers))
     env <- make_registered(x, list(...), rlang::current_env())
     return(as_vector_env(env, num_envs, max_envs = max_envs, frames = frames))
@@ -103,7 +104,6 @@ as_vector_env.character <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
       call = call
     )
   }
-  given <- given_id(x)
   single <- frames || length(given$remembers)
   made <- if (single) {
     list(env = make(NULL))
@@ -165,20 +165,20 @@ close_or_warn <- function(env) {
   })
 }
 
-# Making one from an id --------------------------------------------------------------------
+# Making an environment from an id ---------------------------------------------------------
 
 # The number of sub-environments of an environment made from its id.
 #
-# The rule depends on the environment and the number of episodes, never on cores, workers or time,
-# so that a seed gives the same results everywhere. Many sub-environments share the cost of a
-# message and of calling the policy. Too many make large messages, and most of them wait while the
-# last episodes of a batch end.
+# The rule depends on the environment and the number of episodes, never on cores, workers or time.
+# So a seed gives the same results everywhere. Many sub-environments share the cost of a message and
+# of a call of the policy. With too many, messages are large, and most sub-environments wait while
+# the last episodes of a batch end.
 
 entry_point_sub_envs <- 256L
 most_sub_envs <- 256L
 fewest_sub_envs <- 16L
 
-# The most bytes for the observations of all sub-environments, if there are more than 16.
+# The most bytes that the observations of more than 16 sub-environments may take together.
 most_observation_bytes <- 2^20
 
 # Fewer episodes than this do not use worker processes.
@@ -192,7 +192,7 @@ count_sub_envs <- function(observation_bytes) {
   as.integer(min(most_sub_envs, max(fewest_sub_envs, room)))
 }
 
-# The size of an observation in a message. Only arrays, which may be large, are counted.
+# The size of an observation in a message. It counts only arrays, which may be large.
 observation_bytes <- function(space) {
   if (has_parts(space)) {
     sum(vapply(space$spaces, observation_bytes, 0))
@@ -206,7 +206,8 @@ observation_bytes <- function(space) {
 
 #' Make an environment with sub-environments, or without any if the server cannot make them
 #'
-#' @param make A function that makes it, of the number of sub-environments and how they run.
+#' @param make A function that makes the environment. Its arguments are the number of
+#'   sub-environments and how they run.
 #' @param described As returned by [known_description()].
 #' @return A list: `env`, the environment, and `batch_size`, the number of episodes in a batch if
 #'   each sub-environment has its own seed.
@@ -260,28 +261,29 @@ check_no_workers <- function(num_workers, call) {
 # Codes of errors that may disappear with fewer sub-environments or none.
 fewer_sub_envs_codes <- c("not_supported", "too_much_memory", "unsupported_space")
 
-# Evaluates code that makes an environment. NULL if the server cannot make such sub-environments, or
-# not that many.
+# Evaluates code that makes an environment. Returns NULL if the server cannot make such
+# sub-environments, or not so many.
 if_supported <- function(code) {
   tryCatch(code, gym_error_http = function(cnd) {
     if (!isTRUE(cnd$code %in% fewer_sub_envs_codes)) rlang::cnd_signal(cnd)
   })
 }
 
-# A server's description of an environment given by its id: its spaces and its limits. This does not
-# make an instance.
+# A server describes an environment given by its id, its spaces and its limits, without making an
+# instance.
 
-#' Describe an environment whose episodes a server plays itself
+#' Describe an environment whose episodes the server plays itself
 #'
 #' The server is asked once for each environment.
 #' @param env_id,num_envs,frames,client As for [as_vector_env()].
 #' @param arguments The arguments of the environment, a list.
 #' @return As [as_vector_env()], without the functions that play, and with `description`, a list:
-#'   `fields`, JSON texts by which a request names the environment, `group`, the number of episodes
-#'   that share a seed if all sub-environments have one generator (or `NULL`), `processes`, the
-#'   number that play, `needs_max_steps`, whether an episode may go on forever, `versions` and
-#'   `processor`. `NULL` if R plays its episodes: an environment in R or an object, frames, wrappers
-#'   that remember earlier episodes, arguments about sub-environments.
+#'   `fields`, JSON texts by which a request names the environment; `group`, the number of episodes
+#'   that share a seed if all sub-environments have one generator (or `NULL`); `processes`, the
+#'   number of processes that play; `needs_max_steps`, whether an episode may go on forever;
+#'   `versions` and `processor`. `NULL` if R plays the episodes: for an environment in R or an
+#'   object, with frames, with wrappers that remember earlier episodes, or with arguments about
+#'   sub-environments.
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {
@@ -302,7 +304,7 @@ describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FA
   described
 }
 
-# The server's description of an environment, `NULL` if it does not play it itself.
+# The server's description of an environment, `NULL` if the server does not play it itself.
 known_description <- function(client, env_id, arguments, call) {
   described <- client_state(client)$described
   key <- rlang::hash(list(env_id, if (length(arguments)) arguments))
@@ -345,7 +347,7 @@ ask_description <- function(client, env_id, arguments, call) {
       versions = answer$versions, processor = shown_line(answer$processor)
     )
   )
-  # How many episodes its last request had, see play_requests().
+  # play_requests() notes here how many episodes the last request had.
   vector_env$known <- new.env(parent = emptyenv())
   vector_env
 }

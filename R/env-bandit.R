@@ -2,8 +2,7 @@
 #'
 #' A bandit has arms, each of which pays a reward from its own normal distribution (Sutton and Barto
 #' 2018, chapter 2). The observation is always 0, and an action is the number of an arm, from 0.
-#' Each episode draws new means of the arms, unless you give them. This is the testbed of section
-#' 2.3.
+#' Unless you give the means, each episode draws new ones. This is the testbed of section 2.3.
 #'
 #' @param arms The number of arms, a whole number of at least 1. The default is 10, or the number of
 #'   means given.

@@ -1,6 +1,6 @@
 # The checks of check_env(). Each records its findings in `check`, an environment with `env`,
 # `found` (a list of findings), `misfits` (the number of observations that did not fit their space),
-# `lengths` (of the episodes played) and `limit` (the most steps of an episode).
+# `lengths` (the lengths of the episodes played) and `limit` (the most steps of an episode).
 
 look_at_environment <- function(check, seed) {
   if (!look_at_members(check)) {
@@ -16,7 +16,7 @@ look_at_environment <- function(check, seed) {
   }
   second <- play_and_look(check, seed + 1)
   look_at_end(check, list(first, second))
-  # Two episodes with different seeds only have the same state of the generator if somebody sets it.
+  # After different seeds the generator has the same state only if the environment's code sets it.
   for (topic in names(first$states)) {
     if (identical(first$states[[topic]], second$states[[topic]])) {
       note_finding(check, "seeds", paste0(
@@ -49,7 +49,7 @@ look_at_model <- function(env, check, seed) UseMethod("look_at_model")
 #' @exportS3Method
 look_at_model.default <- function(env, check, seed) NULL
 
-# The same kind of finding is recorded once, at its first occurrence.
+# Records a kind of finding only once, when it first occurs.
 note_finding <- function(check, topic, finding, key = finding, severity = "wrong") {
   key <- paste(topic, key)
   if (is.null(check$found[[key]])) {
@@ -175,7 +175,7 @@ look_at_difference <- function(check, first, again, seed) {
   }
 }
 
-# For numbers it shows the first difference.
+# For vectors of numbers, only the first difference.
 difference_text <- function(one, other) {
   if (is.numeric(one) && is.numeric(other) && length(one) == length(other)) {
     at <- which(!mapply(identical, as.vector(one), as.vector(other)))[1L]

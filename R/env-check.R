@@ -3,36 +3,37 @@
 #' Check the spaces, play a few episodes with random actions and check all results, like Gymnasium's
 #' `check_env()`. It finds observations outside their space, rewards that are not finite numbers,
 #' flags that are not `TRUE` or `FALSE`, seeds that do not reproduce an episode, random numbers from
-#' the session's generator, episodes that never end, and frames that cannot be drawn. If possible,
-#' it continues after a problem.
+#' the session's generator, episodes that never end, and frames that cannot be drawn. After a
+#' problem it continues if possible.
 #'
 #' It plays two episodes, with the seeds `seed` and `seed + 1`. It then repeats the first one with
-#' the same actions, which must give the same results, bit for bit. All sub-environments of a vector
-#' environment are checked together, until the first of them ends.
+#' the same actions. The results must be the same, bit for bit. It checks all sub-environments of a
+#' vector environment together, until the first of them ends.
 #'
-#' If an environment made by `gym_env(model = )` has no other problem, its model is compared with
-#' some 1000 further steps. The starting states, next states, rewards and ends must be possible by
-#' the model.
+#' If an environment made by `gym_env(model = )` has no other problem, the check plays about 1000
+#' more steps and compares them with the model. The model must allow every starting state, next
+#' state, reward and end.
 #'
 #' @param env The environment: made by [gym_env()] or [gym_make()]; any list or environment with
 #'   functions `reset(seed)` and `step(action)`; or an id such as `"CartPole-v1"` (with wrappers,
-#'   see [gym_wrap()]). The check resets and steps it. An environment given by its id is made and
-#'   closed.
+#'   see [gym_wrap()]). The check resets and steps it. If you give an id, the check makes the
+#'   environment and closes it.
 #' @param ... Arguments of the environment, by name, if it is given by its id.
-#' @param max_steps The number of steps after which an episode counts as endless, a whole number,
-#'   1000 by default. A higher limit of the environment itself replaces it.
+#' @param max_steps The number of steps after which an episode counts as endless, a whole number.
+#'   The default is 1000, or the environment's own limit if that is higher.
 #' @param seed The first seed, a whole number from 0 to 2^53.
 #' @param client The client of the server that makes an environment of Gymnasium.
-#' @return An object of class `gym_check`, which prints the findings: a data frame with a row for
-#'   each finding, without rows if there are none, and the columns
+#' @return An object of class `gym_check`, which prints the findings. It is a data frame with a row
+#'   for each finding and the columns
 #'   \describe{
 #'     \item{topic}{The topic, a string: `"spaces"`, `"reset"`, `"step"`, `"seeds"`, `"end"`,
 #'       `"render"` or `"model"`.}
 #'     \item{severity}{`"wrong"` for a mistake, `"note"` for something that may be intended.}
 #'     \item{finding}{The finding, a sentence.}
 #'   }
-#' @section Errors: `gym_error_argument` for an object that is not an environment. As for
-#'   [gym_make()] if an environment is made. Problems of the environment are findings, not errors.
+#' @section Errors: `gym_error_argument` for an object that is not an environment. If it makes an
+#'   environment, also the errors of [gym_make()]. Problems of the environment are findings, not
+#'   errors.
 #' @seealso [gym_env()], `vignette("own-environment")`
 #' @export
 #' @examples
@@ -65,7 +66,7 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   )
   if (check$in_r) {
     check$env <- without_checks(env)
-    # Reset it before it is played again.
+    # The next user must reset the environment first, as after its creation.
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
   }
@@ -108,8 +109,8 @@ raised <- structure(list(), class = "gym_raised")
 
 has_raised <- function(x) inherits(x, "gym_raised")
 
-# Calls a function of the environment. An error is a finding, and so is a change of the session's
-# random generator.
+# Calls a function of the environment. Records an error, or a change of the session's random
+# generator, as a finding.
 call_and_look <- function(check, topic, place, code) {
   before <- session_random_state()
   value <- tryCatch(code, error = function(cnd) {
@@ -146,8 +147,8 @@ first_line <- function(cnd) {
 
 #' Play an episode and check the results
 #' @param actions The actions, `NULL` to draw them.
-#' @return A list of `observations`, `actions`, `results` (of the steps) and `ended`; `NULL` if it
-#'   could not start.
+#' @return A list of `observation` (the first one), `actions`, `results` (of the steps), `ended`
+#'   and `states` (of an R environment's generator); `NULL` if `reset()` failed.
 #' @noRd
 play_and_look <- function(check, seed, actions = NULL) {
   env <- check$env
@@ -158,7 +159,7 @@ play_and_look <- function(check, seed, actions = NULL) {
     return(NULL)
   }
   look_at_observation(check, "reset", observation, "The first observation")
-  # The environment draws from the first stream of the seed.
+  # The environment uses the first random stream of the seed, so actions use the next one.
   drawn <- new_generator(stream = parallel::nextRNGStream(seed_stream(seed)))
   episode <- list(
     observation = observation, actions = list(), results = list(), ended = FALSE,
@@ -185,7 +186,8 @@ play_and_look <- function(check, seed, actions = NULL) {
   episode
 }
 
-# Explaining a misfit takes milliseconds, and an episode may have a thousand of them.
+# To explain why an observation does not fit takes milliseconds, and an episode may have a
+# thousand.
 most_misfits <- 20L
 
 look_at_observation <- function(check, topic, observation, what) {
@@ -235,7 +237,8 @@ look_at_step <- function(check, out, place) {
 
 # Environments written in R --------------------------------------------------------------
 
-# The environment without its own checks, which end an episode at the first mistake.
+# The environment without its own checks: they raise an error at the first mistake, and
+# check_env() continues.
 without_checks <- function(env) {
   sub_env <- sub_env_of(env)
   list(

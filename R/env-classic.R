@@ -2,19 +2,19 @@
 
 #' Create an environment on a server
 #'
-#' Make an instance of an environment. The server keeps it until [env_close()] or the end of the
-#' session.
+#' Make an instance of an environment. The server keeps the instance until [env_close()] or the end
+#' of the session.
 #'
 #' @param x A client, made by [create_GymClient()], [gym_client()] or [gym_server_start()].
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or the result of
 #'   [gym_wrap()]. [env_registry()] lists the ids.
 #' @param seed The seed of the first reset (unless [env_reset()] gets one) and of action sampling: a
 #'   whole number of at least 0, or `NULL` for a random seed. A vector environment also accepts one
-#'   for each sub-environment, see [env_reset()].
+#'   seed for each sub-environment, see [env_reset()].
 #' @param render_mode `"rgb_array"` for frames, or `"human"` to watch: this also opens a page that
 #'   shows the environment in real time, see [env_watch()]. `NULL`, the default, uses frames if the
-#'   environment can draw them. They are drawn only when [env_render()] asks for them or somebody
-#'   watches.
+#'   environment can draw them. The server draws them only when [env_render()] asks for one or
+#'   somebody watches.
 #' @param num_envs The number of sub-environments of a vector environment, a whole number of at
 #'   least 1. Sub-environments are copies of the environment that are reset and stepped together.
 #'   Each has its own row in observations and actions, even if there is only one. The server's limit
@@ -27,29 +27,29 @@
 #'   a string, and its arguments by name, such as `list("TimeLimit", max_episode_steps = 50)`.
 #'   [gym_wrap()] builds such a list with a pipe.
 #' @param vectorization_mode How the sub-environments run. `"vector_entry_point"` uses the
-#'   environment's own vector implementation if it has one, like CartPole, whose is the fastest from
-#'   some eight sub-environments on. `"sync"` runs them one after the other in the server's process.
-#'   `"async"` runs groups of them in worker processes, which is worthwhile if a step takes long.
-#'   `"sync"` and `"async"` give the same results. `NULL`, the default, uses the environment's own
-#'   implementation if it supports the other arguments, and otherwise depends on `num_workers`. Only
-#'   with `num_envs`.
+#'   environment's own vector implementation, if it has one. CartPole has one, which is the fastest
+#'   way from about eight sub-environments. `"sync"` runs them one after the other in the server's
+#'   process. `"async"` runs groups of them in worker processes, which is worthwhile if a step takes
+#'   long. `"sync"` and `"async"` give the same results. `NULL`, the default, uses the environment's
+#'   own implementation if that supports the other arguments; otherwise `num_workers` decides.
+#'   Requires `num_envs`.
 #' @param autoreset_mode What happens to a sub-environment after the end of its episode.
 #'   `"NextStep"`: the next step resets it and ignores its action and reward. `"SameStep"`: the same
 #'   step resets it, and its last observation is in the info, see [env_step()]. `"Disabled"`: call
-#'   [env_reset()] with a `mask` before it steps again. `NULL`, the default, is `"NextStep"`. Only
-#'   with `num_envs`.
+#'   [env_reset()] with a `mask` before it steps again. `NULL`, the default, is `"NextStep"`.
+#'   Requires `num_envs`.
 #' @param name A name of your choice, a string of at most 100 printable characters. [env_list()]
 #'   shows it to all users of the server. `NULL`, the default, for no name.
 #' @param num_workers The number of worker processes for the sub-environments, a whole number: 0 is
 #'   `"sync"`, more is `"async"`. The results do not depend on it. `NULL`, the default, lets the
 #'   server choose: none if steps are fast, otherwise at most the number of cores that it may use.
-#'   Only with `num_envs`, at most that number, and not with `"vector_entry_point"`.
+#'   Requires `num_envs`, which is also the largest number allowed. Not for `"vector_entry_point"`.
 #' @return The instance's id, a string of 8 hexadecimal digits.
 #' @section Errors:
 #' * `gym_error_http_400` for an unknown id (the hint lists similar ones), for arguments that the
 #'   environment does not have (code `invalid_kwargs`), for a forbidden wrapper (code
 #'   `wrapper_not_allowed`; the hint lists the allowed ones), for a `vectorization_mode` that does
-#'   not support the other arguments, or worker processes that cannot make the environment (code
+#'   not support the other arguments or worker processes that cannot make the environment (code
 #'   `not_supported`; the hint names alternatives), or if a part of the server is not installed
 #'   (code `missing_dependency`; the hint says how to install it).
 #' * `gym_error_http_429` for more sub-environments than the server allows (code
@@ -63,9 +63,8 @@
 #' The server removes an environment if a call hangs in its worker processes, or if nobody has used
 #' or watched it for a day; see `max_call_seconds` and `idle_minutes` of [gym_server_start()]. Every
 #' later call then raises `gym_error_http_504` with code `call_too_long`, or `gym_error_http_410`
-#' with code `instance_idle_closed`. A call that hangs elsewhere ends the server. If a process of
-#' its sub-environments has ended, later calls raise `gym_error_http_500` with code
-#' `environment_died`.
+#' with code `instance_idle_closed`. A call that hangs elsewhere ends the server. If a worker
+#' process has ended, later calls raise `gym_error_http_500` with code `environment_died`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' client <- gym_client()
@@ -93,11 +92,12 @@ env_create <- function(x, env_id, seed = NULL, render_mode = NULL, num_envs = NU
 
 #' List the environments running on a server
 #'
-#' [env_list()] returns more about each. [env_registry()] lists those that you can make.
+#' [env_list()] also returns their names, age and last use. [env_registry()] lists the environments
+#' that you can make.
 #'
 #' @inheritParams env_create
-#' @return A named list: instance id to environment id, both strings. It contains the environments
-#'   of all clients of the server.
+#' @return A named list of environment ids, strings, with the instance ids as names. It contains the
+#'   environments of all clients of the server.
 #' @section Errors: `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -111,23 +111,23 @@ env_list_all <- function(x) {
 #' Start a new episode
 #'
 #' Reset an environment before its first step and after the end of each episode. A vector
-#' environment resets its sub-environments after their ends by itself, unless its autoreset mode is
-#' `"Disabled"`.
+#' environment itself resets each sub-environment after the end of its episode, unless the autoreset
+#' mode is `"Disabled"`.
 #'
 #' @inheritParams env_create
 #' @param instance_id An instance's id, as returned by [env_create()].
 #' @param seed The seed of the environment and of action sampling: a whole number from 0 to 2^53.
-#'   `NULL` continues the current generator. In a vector environment, one number seeds all: the
-#'   first sub-environment gets it, the second gets it plus 1, and so on. If the environment's own
-#'   implementation has one generator for all, that gets the number. Or give one number for each
-#'   sub-environment, with `NA` to continue its generator.
+#'   `NULL` continues the current generator. In a vector environment, one number is the seed of the
+#'   first sub-environment; the second gets this number plus 1, and so on. If the environment's own
+#'   implementation has one generator for all sub-environments, the number is its seed. You can also
+#'   give one number for each sub-environment, or `NA` to continue its generator.
 #' @param options A named list of options for the environment's reset, such as
 #'   `list(low = -0.1, high = 0.1)` for CartPole.
 #' @param return_info Also return the environment's info? `TRUE` or `FALSE`, the default.
 #' @param mask For a vector environment: which sub-environments to reset, a logical vector with an
-#'   element for each of them, at least one `TRUE`. `NULL`, the default, resets all. An
-#'   environment's own vector implementation does not support a mask, except that of the Atari
-#'   games: make it with `vectorization_mode = "sync"`.
+#'   element for each of them, at least one `TRUE`. `NULL`, the default, resets all. To use a mask,
+#'   make the environment with `vectorization_mode = "sync"`: of the environments' own vector
+#'   implementations, only that of the Atari games supports one.
 #' @return The first observation, in the form of the observation space: a numeric vector for a Box
 #'   of one dimension, an array for one of more, an integer for Discrete. [space_sample()] lists all
 #'   kinds. With `return_info = TRUE` a list of `observation` and `info`.
@@ -136,12 +136,13 @@ env_list_all <- function(x) {
 #'   dimension becomes a matrix with a row for each sub-environment, a Box of more an array whose
 #'   first dimension is the sub-environment. Discrete and Text become a vector with an element for
 #'   each. Tuple and Dict become a list whose parts have this form; Sequence, Graph and OneOf a list
-#'   with an element for each. Numbers are integer if all of them fit. Each element of the info also
-#'   has an entry for each sub-environment, `NA` (in a list `NULL`) if it has no value.
+#'   with an element for each. Numbers are integers if all of them fit. Each element of the info
+#'   also has an entry for each sub-environment, `NA` (in a list `NULL`) for a sub-environment
+#'   without a value.
 #'
 #'   An `info` is a named list. It is sent without types: an array of plain values of one kind
 #'   becomes a vector, an array of equally long arrays a matrix (and so on), and any other array a
-#'   list. An array of one number therefore looks like the number. The texts "NaN", "Infinity" and
+#'   list. So an array of one number looks like the number itself. The texts "NaN", "Infinity" and
 #'   "-Infinity" look like these numbers unless other text is beside them. An integer beyond 2^53
 #'   arrives as text.
 #' @section Errors: `gym_error_http_400` for an unknown instance, and with code `not_supported` for
@@ -175,17 +176,18 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #' @inheritParams env_reset
 #' @param action An action of the action space: a whole number for Discrete (or its meaning, such as
 #'   `"push left"`, if the printed environment shows meanings), a numeric vector or array for Box.
-#'   The names of its numbers must be known, such as `"main engine"` or, as in a table of steps,
-#'   `"action_1"`, in any order. [space_sample()] lists all kinds. A vector environment takes one
-#'   for each sub-environment, in the form of the observations of [env_reset()]: a vector for
-#'   Discrete, a matrix with a row for each for a Box of one dimension.
+#'   If its numbers have names, these must be the documented ones, such as `"main engine"`, or those
+#'   of a table of steps, such as `"action_1"`, in any order. [space_sample()] lists all kinds. A
+#'   vector environment takes one action for each sub-environment, in the form of the observations
+#'   of [env_reset()]: a vector for Discrete, a matrix with a row for each for a Box of one
+#'   dimension.
 #' @param render Show the environment? `TRUE` or `FALSE`, the default. The first `TRUE` opens the
-#'   environment's page, see [env_watch()]. While somebody watches, each such step takes real time.
-#'   [env_render()] returns a frame.
+#'   environment's page, see [env_watch()]. While somebody watches, each step with `TRUE` takes real
+#'   time. [env_render()] returns a frame.
 #' @param which For a vector environment: the numbers of the sub-environments to step, from 1 and in
 #'   increasing order. `action` and the result then have rows for these only. `NULL`, the default,
-#'   steps all. An environment's own vector implementation always steps all: make it with
-#'   `vectorization_mode = "sync"`.
+#'   steps all. To use `which`, make the environment with `vectorization_mode = "sync"`: an
+#'   environment's own vector implementation always steps all.
 #' @return A list of
 #'   * `observation`, as from [env_reset()],
 #'   * `reward`, a number,
@@ -197,16 +199,16 @@ env_reset <- function(x, instance_id, seed = NULL, options = NULL, return_info =
 #'   In a vector environment `reward` is a numeric vector, and `done`, `terminated` and `truncated`
 #'   are logical vectors, with an element for each sub-environment that stepped. The additional
 #'   element `next_observation` has the observations that the step led to, in the form of
-#'   `observation`. The two differ only with autoreset mode `"SameStep"`: after the end of an
-#'   episode, `next_observation` is its last observation and `observation` the first one of the next
-#'   episode. The info then also has `final_obs`, a list with the last observation of each
-#'   sub-environment whose episode ended, `NULL` for the others.
+#'   `observation`. The two differ only with autoreset mode `"SameStep"`: at the end of an episode,
+#'   `next_observation` is the last observation of this episode, and `observation` is the first one
+#'   of the next episode. The info then also has `final_obs`, a list with the last observation of
+#'   each sub-environment whose episode ended, `NULL` for the others.
 #' @section Errors:
 #' * `gym_error_space` for an action that does not fit the action space; the environment is
-#'   unchanged. A Box action outside the bounds is passed to the environment, as in Gymnasium; most
-#'   clip it. In a vector environment also for a wrong number of actions. The message names the
+#'   unchanged. In a vector environment also for a wrong number of actions. The message names the
 #'   sub-environment: by its number from 1, or, if the server refuses the action, by its index from
-#'   0, such as `[2]` for the third.
+#'   0, such as `[2]` for the third. A Box action outside its bounds is not an error: the
+#'   environment gets it, as in Gymnasium, and most environments clip it.
 #' * `gym_error_argument` for an invalid `which`.
 #' * `gym_error_http_400` with code `reset_needed` before the first reset, or after the end of an
 #'   episode if `autoreset_mode` is `"Disabled"` (the message counts sub-environments from 0), and
@@ -237,7 +239,7 @@ env_step <- function(x, instance_id, action, render = FALSE, which = NULL) {
 
 #' Close an environment
 #'
-#' Remove the instance from the server, with its monitor if it has one.
+#' Remove the instance from the server. If it has a monitor, this ends the monitor, too.
 #'
 #' @inheritParams env_reset
 #' @return Nothing, invisibly.
@@ -256,8 +258,8 @@ env_close <- function(x, instance_id) {
 
 #' Upload results to OpenAI Gym
 #'
-#' OpenAI's service closed in 2017. The function remains so that old scripts fail with a clear
-#' reason: it always raises an error.
+#' OpenAI's service closed in 2017. This function always raises an error, so that old scripts fail
+#' with a clear reason.
 #'
 #' @inheritParams env_create
 #' @param training_dir The directory of a monitor's results, a string.

@@ -1,4 +1,4 @@
-# A client's view of the environments on a server.
+# What a client does with, and knows about, the environments on a server.
 
 create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,
@@ -85,13 +85,13 @@ close_if_there <- function(client, instance_id, call = rlang::caller_env()) {
 # The codes of errors for an instance that was closed or removed.
 gone_codes <- c("unknown_instance", "instance_idle_closed", "call_too_long", "environment_died")
 
-# The client's knowledge of an instance. The server is asked once.
+# What the client knows about an instance. It asks the server only once.
 known_instance <- function(client, instance_id, call = rlang::caller_env()) {
   instances <- if (inherits(client, "GymClient")) client_state(client)$instances
   is_name <- is.character(instance_id) && length(instance_id) == 1L && nzchar(instance_id)
   instance <- if (is_name) instances[[instance_id]]
-  # What is known was checked when it was learned. To ask each time whether the server runs would
-  # take a tenth of a step.
+  # A known instance was checked when the client first asked about it. Checking each time whether
+  # the server still runs would make a step a tenth slower.
   if (is.null(instance)) {
     check_client(client, "x", call)
     check_string(instance_id, call = call)
@@ -108,9 +108,9 @@ read_space <- function(answer, name) {
 
 #' Find out whether an instance has ended with its server
 #'
-#' The process of a server of this session is known. An object that comes from another session, such
-#' as by `readRDS()`, asks the server.
-#' @param pid The process in which the instance was made.
+#' For a server of this session, this checks the server's process. For an object from another
+#' session, for example one read by `readRDS()`, it asks the server.
+#' @param pid The id of the process in which the instance was made.
 #' @return What has ended, in words; `NULL` if nothing has.
 #' @noRd
 end_of_instance <- function(client, instance_id, pid) {
@@ -130,7 +130,7 @@ end_of_instance <- function(client, instance_id, pid) {
   }
 }
 
-# The same for the instance of a classic call, which is named by its id.
+# As end_of_instance(), for a classic call, which names the instance by its id.
 end_of_named <- function(client, instance_id) {
   state <- client_state(client)
   known <- !is.null(state$instances[[instance_id]])
@@ -144,7 +144,7 @@ check_not_ended <- function(client, instance_id, call = rlang::caller_env()) {
   }
 }
 
-# Makes an instance from the server's description, after creating it or on request.
+# Makes the client's record of an instance from the server's description.
 new_instance <- function(client, instance_id, about) {
   instance <- new.env(parent = emptyenv())
   instance$client <- client
@@ -167,7 +167,8 @@ new_instance <- function(client, instance_id, about) {
   instance$draws <- !is.null(about$render_mode)
   instance$takes_numbers <- takes_numbers(observed, about$num_envs)
   instance$done <- FALSE
-  # One for each combination of a call's flags, prepared at the first such call.
+  # The prepared requests: one for each combination of a call's flags, made at the first such
+  # call.
   instance$resets <- vector("list", 4L)
   instance$steps <- vector("list", 16L)
   instance
@@ -188,7 +189,7 @@ read_spec <- function(env_id, spec) {
   )
 }
 
-# Gymnasium's warnings about an environment that the server made.
+# Passes on Gymnasium's warnings about an environment that the server made.
 warn_as_gymnasium <- function(answer) {
   for (text in lapply(answer$warnings, shown_line)) {
     rlang::warn(text, class = "gym_warning_gymnasium", .frequency = "once",
@@ -196,8 +197,8 @@ warn_as_gymnasium <- function(answer) {
   }
 }
 
-# The space of all sub-environments together is made only on request: the bounds of thousands of
-# pictures take much memory.
+# Makes the space of all sub-environments only when somebody asks for it: the bounds of thousands
+# of pictures take much memory.
 instance_space <- function(instance, which = c("action_space", "observation_space")) {
   if (is.null(instance$num_envs)) {
     return(instance[[paste0("single_", which)]])
@@ -207,8 +208,8 @@ instance_space <- function(instance, which = c("action_space", "observation_spac
   )
 }
 
-# One seed for all, or in a vector environment one for each sub-environment, NA for none; or a list
-# with several for a sub-environment, the later ones for the episodes that it starts itself.
+# Writes the seeds as JSON: one seed for all sub-environments; one for each of them, NA for none;
+# or a list with several for each, the later ones for the episodes that it starts itself.
 encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
   if (is.null(seed)) {
     return(NULL)
@@ -234,18 +235,18 @@ encode_seed <- function(seed, num_envs = NULL, call = rlang::caller_env()) {
 
 # FrozenLake's random maps -----------------------------------------------------------------
 
-# Gymnasium draws a random map in the constructor, from a generator that cannot be seeded. Here it
-# is drawn from the seed of the run and sent.
+# Gymnasium draws a random map in the constructor, from a generator that nobody can seed. So R
+# draws the map from the seed of the run and sends it.
 
 lake_size <- 8L
 chance_of_ice <- 0.8
 
-#' Draw the map of a FrozenLake with a random map
+#' Draw the map of a FrozenLake if it is to be random
 #'
 #' @param env An environment, or its id.
 #' @param arguments The arguments that it is made with.
-#' @param seed The seed of the map; of several, the first that is given. `NULL` leaves the map to
-#'   the server.
+#' @param seed The seed of the map. If there are several seeds, it is the first that is not `NA`.
+#'   `NULL` leaves the map to the server.
 #' @return The arguments, with the map as `desc`.
 #' @noRd
 with_random_map <- function(env, arguments, seed) {
@@ -256,14 +257,14 @@ with_random_map <- function(env, arguments, seed) {
   arguments
 }
 
-# By default FrozenLake has a map with a name.
+# FrozenLake draws a random map only if `map_name` is NULL and there is no `desc`.
 wants_random_map <- function(env, arguments) {
   id <- given_id(env)$id
   rlang::is_string(id) && grepl("^FrozenLake", id) && "map_name" %in% names(arguments) &&
     is.null(arguments[["map_name"]]) && is.null(arguments[["desc"]])
 }
 
-# Like Gymnasium: draws cells until there is a way from the start to the goal.
+# Like Gymnasium, draws all cells until there is a way from the start to the goal.
 draw_lake <- function() {
   repeat {
     cells <- matrix(stats::runif(lake_size^2) < chance_of_ice, lake_size)

@@ -1,53 +1,56 @@
 #' Make an environment
 #'
 #' Make an environment with the methods `$reset()` and `$step()`, as in Gymnasium's documentation.
-#' By default it is on the session's own server, which is started if necessary.
+#' By default the environment is on the session's own server, which `gym_make()` starts if
+#' necessary.
 #'
-#' The environment is closed by `$close()`, some time after the object is removed, or at the end of
-#' the session. Keep the object as long as you use the environment.
+#' The environment stays open until you call `$close()`, until R's garbage collector removes the
+#' object, or until the session ends. Keep the object as long as you use the environment.
 #'
-#' With `num_envs` it is a vector environment. It has sub-environments, copies of the environment
-#' that one call resets or steps together. Observations and actions then have a row for each
-#' sub-environment; [env_reset()] and [env_step()] describe their forms.
+#' With `num_envs`, the result is a vector environment. It has sub-environments: copies of the
+#' environment that one call resets or steps together. Observations and actions then have a row for
+#' each sub-environment; [env_reset()] and [env_step()] describe their forms.
 #'
-#' For an Atari game Python's `make_vec()` takes the game's own vector environment, which observes
-#' the last four frames, in grey and 84 x 84. Here its sub-environments are the same as a single
-#' environment: each observes one frame. `vectorization_mode = "vector_entry_point"` gives what
-#' Python gives. It takes an `autoreset_mode`, a seed below 2^31 for each sub-environment, the mask
-#' of a reset, and arguments of its own, such as `reward_clipping`. It counts the frames of an
-#' episode (`max_num_frames_per_episode`) and has no `max_episode_steps`.
+#' For an Atari game, Python's `make_vec()` uses the game's own vector environment. Its observations
+#' are the last four frames, in grey, 84 x 84 pixels. `gym_make()` instead makes sub-environments
+#' that are the same as a single environment: each observes one frame. To get what Python gives, use
+#' `vectorization_mode = "vector_entry_point"`. It supports `autoreset_mode`, a seed below 2^31 for
+#' each sub-environment, the mask of a reset, and the game's own arguments, such as
+#' `reward_clipping`. It limits the frames of an episode (`max_num_frames_per_episode`) and has no
+#' `max_episode_steps`.
 #'
 #' # Names of observations
 #'
-#' If Gymnasium's documentation names the numbers of an observation, such as CartPole's, the results
-#' of `$reset()` and `$step()` have these names. With `num_envs` they are column names:
-#' `observation["pole_angle"]`, `observations[, "pole_angle"]`. The parts of a Tuple, such as
-#' Blackjack's, have names as well. The names are the element `names` of
-#' `$single_observation_space`. It is `NULL` for other environments and if a wrapper changes the
-#' observations, such as `NormalizeObservation`; those of a `TransformObservation` are the names of
-#' its `observation_space`. The classic calls return observations without names. Pictures show units
-#' and limits only where no wrapper changes the observations.
+#' If Gymnasium's documentation names the numbers of an observation, as for CartPole, the results of
+#' `$reset()` and `$step()` have these names: `observation["pole_angle"]`. With `num_envs` they are
+#' column names: `observations[, "pole_angle"]`. The parts of a Tuple, such as Blackjack's, have
+#' names as well. `$single_observation_space$names` lists them. It is `NULL` for other environments,
+#' and if a wrapper such as `NormalizeObservation` changes the observations. With
+#' `TransformObservation`, the names are those of its `observation_space`. The classic calls return
+#' observations without names. Pictures show units and limits only if no wrapper changes the
+#' observations.
 #'
 #' # After the end of an episode
 #'
-#' Without `num_envs`, call `$reset()` after a step has returned `done`. With `num_envs`,
-#' `autoreset_mode` decides about sub-environments that end while others play on. With the default,
-#' `"NextStep"`, the next `$step()` resets them: it ignores the action and returns the first
-#' observation of the new episode, the reward 0, and neither `terminated` nor `truncated`. Leave
-#' that step out when you sum rewards or count steps, as [rollout()] does. With `"SameStep"` the
-#' step that ends an episode already returns the first observation of the next one. With
-#' `"Disabled"` you call `$reset(mask = )`. In all modes, the element `next_observation` of the
-#' result is the observation after the step: at the end of an episode its last one, not the first of
-#' the next.
+#' Without `num_envs`, call `$reset()` after a step whose `done` is `TRUE`. With `num_envs`, some
+#' episodes end while others go on, and `autoreset_mode` decides what happens. With the default,
+#' `"NextStep"`, the next `$step()` resets a sub-environment whose episode has ended: it ignores the
+#' action and returns the first observation of the new episode, the reward 0, and neither
+#' `terminated` nor `truncated`. Leave that step out when you sum rewards or count steps, as
+#' [rollout()] does. With `"SameStep"` the step that ends an episode already returns the first
+#' observation of the next one. With `"Disabled"` you call `$reset(mask = )`. In all modes, the
+#' element `next_observation` of the result is the observation after the step. At the end of an
+#' episode it is the last observation of that episode, not the first one of the next.
 #'
 #' @inheritParams env_create
 #' @param ... Further arguments of the environment, by name, such as `sutton_barto_reward = TRUE`
 #'   for CartPole. Every environment accepts `max_episode_steps`, which replaces its own step limit;
-#'   -1 removes it. FrozenLake's random map (`desc = NULL, map_name = NULL`) is drawn from the seed,
-#'   the same for all sub-environments; `$spec$kwargs` has it as `desc`.
+#'   -1 removes it. For FrozenLake, `desc = NULL, map_name = NULL` draws a random map from the seed,
+#'   the same for all sub-environments; `$spec$kwargs$desc` has it.
 #' @param seed The seed of the first reset (unless `$reset()` gets one) and of action sampling: a
-#'   whole number of at least 0; for a vector environment also one for each sub-environment, see
-#'   [env_reset()]. `NULL`, the default, draws one from R's generator, so [set.seed()] fixes it.
+#'   whole number of at least 0. A vector environment also accepts one seed for each
+#'   sub-environment, see [env_reset()]. `NULL`, the default, draws a seed from R's generator, so
+#'   [set.seed()] fixes it.
 #' @param client A client. The default is the session's client, [gym_client()].
 #' @return An object of class `gym_env` with
 #'   * `$reset(seed = NULL, options = NULL, return_info = FALSE, mask = NULL, infos = TRUE)`: starts
@@ -58,23 +61,25 @@
 #'   * `$render(which = 1)`: the current frame, as [env_render()],
 #'   * `$watch()`: opens the page that shows it live, as [env_watch()],
 #'   * `$close()`: removes it from the server,
-#'   * `$is_open`: `TRUE`, and `FALSE` after `$close()` or if its server or its session has ended,
+#'   * `$is_open`: `FALSE` after `$close()` or if the environment's server or session has ended,
+#'     otherwise `TRUE`,
 #'   * `$action_space`, `$observation_space`: the spaces, as [env_action_space_info()],
-#'   * `$single_action_space`, `$single_observation_space`: those of one sub-environment; in a
-#'     single environment the same,
+#'   * `$single_action_space`, `$single_observation_space`: the spaces of one sub-environment; in a
+#'     single environment, the same as the two above,
 #'   * `$num_envs`, `$vectorization_mode`, `$num_workers`, `$autoreset_mode`: the number of
 #'     sub-environments and their settings, see [env_create()]; `NULL` in a single environment.
 #'     `$num_workers` is also `NULL` with a vector implementation,
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` (the smallest limit,
-#'     including wrappers) and `render_fps` (frames per second), these three `NULL` if the
-#'     environment has none, `engine` (the version of the package that simulates it, such as
-#'     mujoco, by name; none for an environment of Gymnasium alone) and `wrappers` (their names),
+#'     including wrappers) and `render_fps` (frames per second), each of these three `NULL` if the
+#'     environment has none; `engine` (the version of the package that simulates it, by the
+#'     package's name, such as mujoco; absent if Gymnasium itself does); `wrappers` (their names)
+#'     and `kwargs` (the environment's arguments),
 #'   * `$client`, `$instance_id`: for the classic calls.
-#' @section Warnings: Gymnasium's own have class `gym_warning_gymnasium` and come once a session:
-#'   an id that is out of date, or a value that an environment does not recommend.
+#' @section Warnings: Gymnasium's own warnings have class `gym_warning_gymnasium` and appear once
+#'   per session, for example for an outdated id.
 #' @section Errors: As for [env_create()]. `gym_error_server_start` if no server could be started.
-#'   `gym_error_install` if its Python environment could not be installed. `gym_error_argument` for
-#'   a name after the dollar that the object does not have.
+#'   `gym_error_install` if the server's Python environment could not be installed.
+#'   `gym_error_argument` for a name after the dollar that the object does not have.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)
@@ -91,7 +96,7 @@
 #' framed$observation_space$shape
 #' framed$close()
 #'
-#' # A hundred poles, each pushed to the side to which it leans.
+#' # A hundred poles. Push each cart to the side to which its pole leans.
 #' poles <- gym_make("CartPole-v1", num_envs = 100, seed = 1)
 #' poles
 #' observation <- poles$reset()
@@ -120,7 +125,8 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
                           call = rlang::caller_env()) {
   kwargs <- list(...)
   check_dots_named(kwargs, "seed = 1", call)
-  if (is_registered(env_id)) {
+  given <- given_id(env_id)
+  if (isTRUE(given$registered)) {
     return(make_registered_env(
       env_id, kwargs, seed, num_envs, render_mode = render_mode, wrappers = wrappers,
       vectorization_mode = vectorization_mode, autoreset_mode = autoreset_mode, name = name,
@@ -130,7 +136,6 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
   check_client(client, call = call)
   kwargs <- with_random_map(env_id, kwargs, seed)
   check_wrappers(wrappers, call = call)
-  given <- given_id(env_id)
   wrappers <- split_wrappers(c(given$wrappers, wrappers), call)
   env_id <- given$id %||% env_id
   env <- NULL
@@ -152,7 +157,7 @@ make_unseeded <- function(env_id, ..., seed = NULL, render_mode = NULL, num_envs
 # The names of the arguments that do not belong to the environment.
 how_made <- setdiff(names(formals(make_unseeded)), c("env_id", "...", "client", "call"))
 
-# Rewrites an error about an unknown argument of the environment in R's terms.
+# Replaces Python's error about an unknown argument of the environment by one in R's words.
 explain_unknown_argument <- function(cnd, given, call) {
   pattern <- "unexpected keyword argument '([^']+)'"
   name <- regmatches(cnd$message, regexec(pattern, cnd$message))[[1L]][2L]
@@ -162,7 +167,7 @@ explain_unknown_argument <- function(cnd, given, call) {
   passed <- c(passed_on_by(name), list(gym_make = gym_make))
   others <- passed[names(passed) != "gym_make"]
   own <- arguments_of(if (length(others)) others else passed[1L])
-  # The last one is an argument of all environments.
+  # Every environment accepts `max_episode_steps`.
   choices <- c(arguments_of(passed), "max_episode_steps")
   by <- paste0("`", names(passed)[[1L]], "()`")
   gym_abort(
@@ -176,9 +181,9 @@ explain_unknown_argument <- function(cnd, given, call) {
 }
 
 #' Find the functions that passed an argument on in their `...`
-#' @return A list of exported functions with their names, the one that the user called first. A
-#'   frame of ours with the string `make` also passes them on to the function of that name and to
-#'   train_agent().
+#' @return A named list of exported functions, first the one that the user called. If a function
+#'   of this package has a local string `make`, it passes the argument on to the function of that
+#'   name and to train_agent().
 #' @noRd
 passed_on_by <- function(name) {
   exported <- mget(getNamespaceExports(topenv()), topenv(), "function", list(NULL))
@@ -266,7 +271,7 @@ server_env <- R6Class(
   ),
   private = list(
     instance = NULL, pid = NULL, closed = FALSE,
-    # What has ended before it was closed, in words.
+    # If the server or the session ended first: text that says so.
     ended = NULL,
     finalize = function() {
       # In a forked child the environment still belongs to the parent.
@@ -293,13 +298,13 @@ print_env <- function(env, how, observations, actions) {
   invisible(env)
 }
 
-# Says why an environment is not open.
+# Why an environment is not open, as text.
 end_text <- function(env) {
   ended <- env$.__enclos_env__$private$ended
   if (is.null(ended)) "closed" else paste("made", ended)
 }
 
-# print() shows all that there is to sum up.
+# print() already shows a summary.
 #' @export
 summary.gym_env <- function(object, ...) object
 
@@ -331,14 +336,15 @@ check_open <- function(env, call = rlang::caller_env()) {
   }
 }
 
-# `end` is how it ended, and `client` that of a server that may have ended with it.
+# `end` says how the environment ended. `client` is the client of the server, which may have
+# ended, too.
 abort_closed <- function(hint, call, end = "closed", client = NULL) {
   closed <- end == "closed"
   gym_abort(
     c(paste0("This environment was ", end, "."),
       if (!closed) end_bullets(client$remote_base), i = hint),
-    # Using a closed environment is a mistake of the user's. If it ended with its server, the
-    # connection was lost.
+    # The user made a mistake if they closed the environment. If its server ended, the connection
+    # was lost.
     class = if (closed) "gym_error_argument" else "gym_error_connection",
     argument = if (closed) "env", call = call
   )

@@ -13,7 +13,8 @@ action_meanings <- list(
 )
 
 #' Find the meanings of an environment's actions
-#' @param n The number of actions, or of numbers of an action; `NULL` if it is unknown.
+#' @param n The number of actions; for a Box, the count of numbers in an action; `NULL` if
+#'   unknown.
 #' @return Strings; `NULL` if the environment is unknown or a wrapper has changed the actions.
 #' @noRd
 action_meaning <- function(env_id, n = NULL) {
@@ -25,8 +26,8 @@ action_meaning <- function(env_id, n = NULL) {
 environment_family <- function(env_id) sub("-v[0-9]+$", "", env_id %||% "")
 
 #' Name the actions of an environment
-#' @param n The number of actions; for a Box, the number of numbers of an action.
-#' @param start The first of them.
+#' @param n The number of actions; for a Box, the count of numbers in an action.
+#' @param start The first action.
 #' @return Strings such as `"0: push left"`, or only the numbers if the meanings are unknown.
 #' @noRd
 action_names <- function(env_id, n, start = 0L) {
@@ -35,13 +36,13 @@ action_names <- function(env_id, n, start = 0L) {
   if (is.null(meaning)) number else paste0(number, ": ", meaning)
 }
 
-#' Name the numbers of an action that is a Box
+#' Name the numbers of a Box action
 #' @noRd
 action_parts <- function(env_id, n) {
   action_meaning(env_id, n) %||% if (n == 1L) "action" else paste0("action_", seq_len(n))
 }
 
-#' Convert actions given by their meaning to numbers
+#' Convert actions given by their meanings to numbers
 #' @return The actions; values other than text are unchanged.
 #' @noRd
 numbered_actions <- function(instance, action, call) {
@@ -66,12 +67,12 @@ numbered_actions <- function(instance, action, call) {
 
 # Actions with names -----------------------------------------------------------------------
 
-#' Put the numbers or parts of an action in the order of the space, by their names
+#' Sort the numbers or parts of an action by their names, in the order of the space
 #'
-#' The names are those of the space or of the documentation, or of the columns of steps.
+#' The names may be those of the space, of the documentation, or of the columns of a table of steps.
 #' @param space The action space.
 #' @param action One action, or a batch of them.
-#' @return The action without names. Names that are not known are an error.
+#' @return The action without names. Unknown names are an error.
 #' @noRd
 action_by_name <- function(space, action, env_id, call) {
   if (is.list(action)) {
@@ -93,7 +94,7 @@ action_by_name <- function(space, action, env_id, call) {
   given <- if (rows) colnames(action) else names(action)
   n <- prod(space$shape)
   if (is.null(given) || length(space$shape) != 1L || n < 2) {
-    # Names of single numbers are labels, as those that predict() gives.
+    # Names of single numbers are only labels, such as those that predict() adds.
     return(action)
   }
   own <- space$names %||% action_meaning(env_id, n)
@@ -105,11 +106,11 @@ action_by_name <- function(space, action, env_id, call) {
 
 #' Find the places of known names among given ones
 #'
-#' @param forms The names that are known, a list with an element for each form of them.
-#' @param labels Whether names of which none is known are labels of the user's own, such as the
-#'   column names that cbind() makes of the names of variables.
-#' @return What takes values in the order of the names: integers, or `TRUE` for the order given.
-#'   `NULL` if the names are to be refused.
+#' @param forms A list of character vectors. The given names must be those of one vector.
+#' @param labels Whether to ignore the names if none of them is known. cbind(), for example, makes
+#'   column names of the names of variables.
+#' @return An index that puts values in the order of the known names: integers, or `TRUE` to keep
+#'   the order as it is. `NULL` for names that must be refused.
 #' @noRd
 places_of_names <- function(given, forms, labels = FALSE) {
   if (is.null(given) || labels && !any(given %in% unlist(forms))) {
@@ -190,7 +191,7 @@ observation_parts <- list(
 )
 observation_parts$LunarLanderContinuous <- observation_parts$LunarLander
 
-# After these wrappers a number no longer matches its name in the documentation.
+# These wrappers change the observations, so the names of the documentation no longer match.
 changing_wrappers <- c("DiscretizeObservation", "NormalizeObservation", "RescaleObservation")
 
 #' Name the numbers or parts of observations
@@ -215,12 +216,12 @@ observation_names <- function(env_id, space, wrappers = character()) {
 
 # Units and limits ------------------------------------------------------------------------
 
-# The units of the parts of observations, and the values between which an episode goes on: from the
-# sections "Observation Space" and "Episode End" in Gymnasium's documentation of each environment
-# (https://gymnasium.farama.org/environments/). If these say nothing, they come from the documented
-# code: CartPole computes in metres, kilograms and seconds (gravity 9.8), and Pendulum's
-# documentation defines theta in radians. Parts without a unit in either, such as LunarLander's
-# coordinates, have none.
+# The units of the parts of observations, and the limits at which an episode ends. Both come from
+# the sections "Observation Space" and "Episode End" in Gymnasium's documentation of each
+# environment (https://gymnasium.farama.org/environments/). If the documentation says nothing, they
+# come from the code: CartPole computes in metres, kilograms and seconds (gravity 9.8), and
+# Pendulum's documentation defines theta in radians. Parts without a unit in either, such as
+# LunarLander's coordinates, have none.
 
 observation_units <- list(
   Acrobot = c(angular_velocity_theta1 = "rad/s", angular_velocity_theta2 = "rad/s"),
@@ -249,8 +250,8 @@ episode_limits$LunarLanderContinuous <- episode_limits$LunarLander
 
 #' Find the id whose documentation describes the values in a result
 #' @param what "Observation" or "Action".
-#' @return A string; `NULL` if a wrapper changes the values, which then have other units and none
-#'   of the documented limits.
+#' @return A string; `NULL` if a wrapper changes the values, because the documented units and
+#'   limits no longer apply.
 #' @noRd
 described_id <- function(x, what = "Observation") {
   changing <- paste0(c("Discretize", "Normalize", "Rescale", "Transform"), what)
@@ -271,5 +272,5 @@ observation_labels <- function(env_id, names) {
   words
 }
 
-# The units of actions that are one number. Pendulum's documentation has "torque in N m".
+# The units of actions that are one number. Pendulum's documentation says "torque in N m".
 action_units <- list(Pendulum = "N m")

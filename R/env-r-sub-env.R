@@ -1,11 +1,11 @@
-# Steps and resets of a sub-environment written in R, see definition_sub_env(), and the constant
-# part of it.
+# Steps and resets of a sub-environment written in R, which definition_sub_env() makes, and its
+# traits: the part that never changes.
 
 #' Start an episode
 #'
-#' @param seed The seed of its generator; `NULL` continues the generator. An environment that was
-#'   never seeded draws a seed from the session's generator.
-#' @return The first observation, checked: one, or a batch for a vectorised environment.
+#' @param seed The seed of the sub-environment's generator. `NULL` continues the generator, or, if
+#'   there is none yet, draws a seed from the session's generator.
+#' @return The first observation, checked; for a vectorised environment, a batch of them.
 #' @noRd
 reset_sub_env <- function(sub_env, seed = NULL, options = NULL, sub_env_number = NULL,
                           call = rlang::caller_env()) {
@@ -50,7 +50,7 @@ check_was_reset <- function(sub_env, call) {
   }
 }
 
-#' Report an error in the user's function, with its place
+#' Report an error in the user's function, and say where it occurred
 #'
 #' @param method Which of the user's functions raised it.
 #' @noRd
@@ -71,16 +71,16 @@ abort_raised <- function(cnd, sub_env, sub_env_number, call,
 
 # Traits ---------------------------------------------------------------------------------
 
-# The constant part of an environment written in R: its spaces and its spec, and the checks of every
-# step, which are prepared once.
+# The traits of an environment written in R never change: its spaces, its spec, and the checks of
+# every step, which are prepared once.
 
 #' Describe an environment written in R
 #'
 #' @return A list: `observation_space`, `action_space`, `spec`; `limit`, the number of steps after
-#'   which an episode is cut off, `Inf` for never; `observation_rules`, the observation space, whose
-#'   bounds allow a rounding; `action_rules`, the action space without the bounds of its Boxes,
-#'   because a Box action outside its bounds is passed to the environment as in Gymnasium;
-#'   `fits_observations` and `fits_actions`, fast checks of batches.
+#'   which an episode is cut off, `Inf` for never; `observation_rules`, the observation space with
+#'   slightly wider bounds, which allow rounding errors; `action_rules`, the action space without
+#'   the bounds of its Boxes, because `step()` also gets a Box action outside its bounds, as in
+#'   Gymnasium; `fits_observations` and `fits_actions`, fast checks of batches.
 #' @noRd
 new_traits <- function(observation_space, action_space, id, max_episode_steps = NULL,
                        reward_threshold = NULL, render_fps = NULL, call = rlang::caller_env()) {
@@ -105,7 +105,7 @@ new_traits <- function(observation_space, action_space, id, max_episode_steps = 
   )
 }
 
-# The same environment with another id or limit: `changes` are elements of its spec.
+# The traits with another id or limit: `changes` are elements of the spec.
 change_traits <- function(traits, changes) {
   traits$spec[names(changes)] <- changes
   traits$limit <- traits$spec$max_episode_steps %||% Inf
@@ -133,8 +133,9 @@ loosen_boxes <- function(space) {
 
 # Actions and observations ------------------------------------------------------------
 
-#' Check actions and give them the form that the user's functions get
-#' @param which The numbers of the sub-environments that take them, `NULL` for a single action.
+#' Check actions and convert them to the form that the user's functions expect
+#' @param which The numbers of the sub-environments that take the actions, `NULL` for a single
+#'   action.
 #' @noRd
 checked_action <- function(traits, action, which, call) {
   rules <- traits$action_rules
@@ -149,7 +150,7 @@ checked_action <- function(traits, action, which, call) {
   if (is.null(n)) tidy_value(space, action, NULL) else tidy_actions(space, action)
 }
 
-#' Convert a value to the form of a server's values
+#' Convert a value to the form that values from a server have
 #'
 #' Whole numbers become integers, the parts of a Dict get the order of the space, and numbers get
 #' the names of the space, if it has any.

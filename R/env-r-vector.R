@@ -1,4 +1,4 @@
-# Environments written in R as vector environments, in which episodes are played.
+# Plays environments written in R as vector environments.
 
 # The default number of sub-environments.
 r_sub_envs <- 16L
@@ -33,8 +33,8 @@ as_vector_env.gym_r_env <- function(x, num_envs = NULL, ..., max_envs = Inf, fra
 
 #' Play several sub-environments together
 #'
-#' @param sub_envs A list of them, all with the same traits.
-#' @param alone The environment of the only one, or `NULL`.
+#' @param sub_envs A list of sub-environments, all with the same traits.
+#' @param alone The environment that a single sub-environment belongs to; `NULL` for several.
 #' @noRd
 scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
   traits <- sub_envs[[1L]]$traits
@@ -72,7 +72,7 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
         for (k in seq_along(which)) {
           sub_env <- stepping[[k]]
           generator <- sub_env$generator
-          # Like with_generator(), but the session's state is restored once for all.
+          # Like with_generator(), but restores the session's state only once, after all steps.
           assign(".Random.seed", generator$state, envir = session)
           outs[k] <- list(sub_env$step(pick(action, k)))
           generator$state <- session$.Random.seed
@@ -92,10 +92,10 @@ scalar_vector_env <- function(sub_envs, batch_size, frames, alone) {
 
 #' Make the function that steps a single sub-environment
 #'
-#' Correct results, the usual case, are checked fast; the rest is left to [complete_step()].
-#' [single_guard()], which is made once for many steps, adds the place to errors of the user's
-#' functions.
-#' @return A function of an action, which returns a step as in [as_vector_env()].
+#' It checks correct results, the usual case, in a fast way, and leaves all others to
+#' [complete_step()]. [single_guard()] says in which step the user's functions raised an error. It
+#' is set up once for many steps.
+#' @return A function of an action that returns a step, as in [as_vector_env()].
 #' @noRd
 single_stepper <- function(sub_env) {
   traits <- sub_env$traits
@@ -133,7 +133,7 @@ single_stepper <- function(sub_env) {
   }
 }
 
-# A quick check of the usual case: `TRUE` if the step certainly has the right parts.
+# A quick check of the usual case: `TRUE` if the result is certainly right.
 is_right_step <- function(out, traits) {
   reward <- if (is.list(out)) out$reward
   flag <- out$terminated
@@ -143,7 +143,7 @@ is_right_step <- function(out, traits) {
     fits_quickly(traits$observation_space, out$observation, NULL, traits$fits_observations)
 }
 
-# Adds to an error in a step which environment and which step it was.
+# Adds the environment and the step to an error of the user's function.
 single_guard <- function(sub_env) {
   sub_env$stepping <- FALSE
   function(code) {
@@ -158,7 +158,7 @@ single_guard <- function(sub_env) {
 
 #' Make a function that combines the results of the steps of several sub-environments
 #'
-#' @return A function of a list of results. It returns `NULL` if one of them may be wrong.
+#' @return A function of a list of results. It returns `NULL` if one of the results may be wrong.
 #' @noRd
 result_stacker <- function(traits) {
   space <- traits$observation_space
@@ -168,7 +168,7 @@ result_stacker <- function(traits) {
   }
   shape <- as.integer(space$shape)
   size <- prod(shape)
-  # A batch of observations, `NULL` if they have not all the shape of the space.
+  # A batch of observations; `NULL` if one of them does not have the shape of the space.
   stack <- function(values, n) {
     shaped <- if (length(shape) > 1L) {
       all(vapply(values, function(value) identical(dim(value), shape), NA))
@@ -206,7 +206,8 @@ result_stacker <- function(traits) {
   }
 }
 
-# NULL if one of them is not a single value. If all lack an optional element, all are FALSE.
+# Returns NULL if an element is not a single value. If all results lack an optional element, all
+# are FALSE.
 stack_singles <- function(outs, name, optional = FALSE) {
   each <- lapply(outs, .subset2, name)
   length_of <- lengths(each)
@@ -217,7 +218,7 @@ stack_singles <- function(outs, name, optional = FALSE) {
   }
 }
 
-# Checks each result and finds the wrong one.
+# Checks each result alone, so that an error names the wrong one.
 stack_checked <- function(outs, sub_envs, numbers, call) {
   space <- sub_envs[[1L]]$traits$observation_space
   results <- Map(complete_step, outs, sub_envs, numbers, MoreArgs = list(call = call))
@@ -229,12 +230,11 @@ stack_checked <- function(outs, sub_envs, numbers, call) {
   )
 }
 
-# One function call for all ------------------------------------------------------------
+# One function call for all sub-environments -------------------------------------------
 
 #' Play a vectorised environment
 #'
-#' All sub-environments are always stepped, including those whose episode has ended; their results
-#' are ignored.
+#' Every step steps all sub-environments. It ignores the results of those whose episode has ended.
 #' @noRd
 vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   sub_env <- definition_sub_env(definition, num_envs)
@@ -262,8 +262,8 @@ vectorized_vector_env <- function(definition, num_envs, frames = FALSE) {
   )
 }
 
-# Sub-environments whose episode has ended may return anything; the result of the first running one
-# replaces theirs.
+# A sub-environment whose episode has ended may return anything. The result of the first running
+# one replaces its result.
 without_ended <- function(out, space, which, n) {
   if (is.list(out)) {
     row <- rep(which[[1L]], n)

@@ -5,23 +5,22 @@
 #'
 #' The functions keep their state in `self`, an R environment: `self$position <- 0`. Each
 #' sub-environment has its own `self`, so [rollout()] and every search can play many of them
-#' together. The environment that you pass to them does not change.
+#' together. They do not change the environment that you pass.
 #'
 #' Each step checks the results of the functions. An observation must belong to the observation
-#' space, including its bounds, beyond which a number that is not whole may be by a rounding, 1e-6
-#' times the bound (or 1e-6); a reward must be one number; a flag `TRUE` or `FALSE`. Actions are
-#' checked before `step` gets them. Only a Box action outside its bounds is passed on, as in
-#' Gymnasium. [check_env()] checks more.
+#' space, a reward must be one number, and a flag must be `TRUE` or `FALSE`. Numbers that are not
+#' integers may exceed a bound by a rounding error of 1e-6 times the bound, or of 1e-6 if that is
+#' larger. Actions are checked before `step` gets them, but `step` also gets a Box action outside
+#' its bounds, as in Gymnasium. [check_env()] checks more.
 #'
 #' # Random numbers
 #'
 #' Each environment and each sub-environment has its own random generator. In `reset` and `step`,
-#' `runif()`, `sample()` and the others draw from it, and the session's generator does not change.
-#' `$reset(seed = 1)` sets its seed. A seed gives the same random numbers for any `RNGkind()` of the
-#' session. A seed of at most 2^31 - 1 is like [set.seed()] for R's generator `"L'Ecuyer-CMRG"`. A
-#' larger one, up to 2^53, selects its own stream, made of its lower 31 bits and of the others. An
-#' environment that was never seeded draws one seed from the session's generator at its first reset,
-#' so [set.seed()] fixes it, too.
+#' `runif()`, `sample()` and all other random functions use it, and the session's generator does not
+#' change. `$reset(seed = 1)` sets its seed. The session's `RNGkind()` makes no difference. A seed
+#' of at most 2^31 - 1 is like [set.seed()] for R's generator `"L'Ecuyer-CMRG"`. Each larger seed,
+#' up to 2^53, selects a random stream of its own. If you give no seed, the first reset draws one
+#' from the session's generator, so [set.seed()] fixes it, too.
 #'
 #' # Vectorised functions
 #'
@@ -29,8 +28,9 @@
 #' faster if they compute with whole vectors. `self$num_envs` is the number of sub-environments.
 #' `reset` returns a batch of observations, for a Box of one dimension a matrix with a row for each
 #' sub-environment. `step` gets a batch of actions and returns a batch of observations and vectors
-#' for `reward`, `terminated` and `truncated`. Sub-environments whose episode has ended are still
-#' stepped, and their results ignored, until all are reset. They share one generator.
+#' for `reward`, `terminated` and `truncated`. `step` continues to step sub-environments whose
+#' episode has ended, until all are reset; their results are ignored. All sub-environments share one
+#' random generator.
 #'
 #' @param reset A function of `self` that starts an episode and returns the first observation. With
 #'   a second argument `options` it gets the options of `$reset(options = )`.
@@ -41,9 +41,9 @@
 #' @param observation_space,action_space The spaces, such as `space_box(-1, 1, shape = 2)` and
 #'   `space_discrete(3)`.
 #' @param ... Further values, by name, with which each `self` starts, such as `size = 5` for
-#'   `self$size`. An environment of R or an object of R6 is refused, also in a list, because all
-#'   sub-environments would share it: make it in `reset`. In a vectorised environment `num_envs` is
-#'   the number of sub-environments of this object, 256 by default.
+#'   `self$size`. Create R environments and R6 objects in `reset` instead: here they are an error,
+#'   also in a list, because all sub-environments would share them. In a vectorised environment,
+#'   `num_envs` is the number of sub-environments of this object, 256 by default.
 #' @param render A function of `self` that draws the environment. It plots with R's graphics, or
 #'   returns a picture: a raster image, a matrix of greys or of colours, or an array of height x
 #'   width x 3. `NULL`, the default, for an environment that cannot be drawn.
@@ -51,9 +51,9 @@
 #'   `TRUE`.
 #' @param model The environment's [model][gym_model()], for [env_model()]; the table of its
 #'   transitions; or a function of the environment that returns one of them. `NULL`, the default,
-#'   for none. It gets the environment's spaces, which are Discrete and may have more states and
-#'   actions than the table. If you give a table, `reset` determines where episodes start: exactly
-#'   if it is not random, and otherwise estimated from 1000 resets.
+#'   for none. The environment's spaces must be Discrete, and may have more states and actions than
+#'   the table. With a table, 1000 resets estimate where episodes start; if `reset` is not random,
+#'   this is exact.
 #' @param id The name of the environment in messages and titles, a string.
 #' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
 #'   `NULL`, the default, for no limit.
@@ -73,8 +73,8 @@
 #'   * `$spec`: a list of `id`, `reward_threshold`, `max_episode_steps` and `render_fps`.
 #' @section Errors: `gym_error_argument` for an invalid argument, and in `$reset()` and `$step()`
 #'   for an invalid result of your function. `gym_error_space` for an action or an observation that
-#'   does not fit its space. `gym_error_environment` if your function raises an error: it also has
-#'   the classes of that error, which is its `parent`.
+#'   does not fit its space. `gym_error_environment` if your function raises an error. It also has
+#'   the classes of your error, which is its `parent`.
 #' @section Warnings: `gym_warning_step_after_done`.
 #' @seealso [gym_register()], [check_env()], `vignette("own-environment")`
 #' @export
@@ -129,8 +129,8 @@ gym_env <- function(reset, step, observation_space, action_space, ..., render = 
   ))
 }
 
-# An environment written in R. `definition` is what sub-environments are made from: `traits`, the
-# functions, `vectorized`, `parameters`, the values with which each `self` starts, and `wrappers`,
+# An environment written in R. Sub-environments are made from its `definition`: `traits`, the
+# functions, `vectorized`, `parameters` (the values with which each `self` starts), and `wrappers`,
 # see wrap_r_env().
 r_env <- R6Class(
   c("gym_r_env", "gym_env"), cloneable = FALSE,
@@ -190,14 +190,14 @@ definition_of <- function(env) {
 
 #' Make a sub-environment from functions, with its own `self`
 #'
-#' A single environment has one of these; a vectorised one has all its sub-environments in one.
-#' @param num_envs The number of sub-environments if it is vectorised.
+#' For a vectorised environment, one such object holds all sub-environments.
+#' @param num_envs The number of sub-environments of a vectorised environment.
 #' @return An environment: `traits`; `reset`, a function of `seed` and `options` that returns the
 #'   first observation; `step`, a function of an action; `render`, a function without arguments, or
 #'   `NULL`; `takes_options`, whether the user's `reset()` accepts options; `num_envs`, `NULL` if it
 #'   is not vectorised; `generator`, its random generator, `NULL` before first use; `taken`, the
-#'   number of steps in the episode, `NA` before the first reset; `ended`, whether it has ended,
-#'   `NA` after the warning; `closed`.
+#'   number of steps in the episode, `NA` before the first reset; `ended`, whether the episode has
+#'   ended, `NA` after the warning about a step after the end; `closed`.
 #' @noRd
 definition_sub_env <- function(definition, num_envs = NULL) {
   reset <- definition$reset
@@ -266,8 +266,9 @@ check_sub_env_open <- function(sub_env, call = rlang::caller_env()) {
 
 #' Refuse values that all sub-environments would share
 #'
-#' R copies no environment, and so no object of R6. What functions enclose is not looked at.
-#' @param values A list with names: the values with which each `self` starts, or the arguments of an
+#' R does not copy environments, and R6 objects are environments. This does not look into the
+#' environments of functions.
+#' @param values A named list: the values with which each `self` starts, or the arguments of an
 #'   entry point.
 #' @noRd
 check_not_shared <- function(values, call = rlang::caller_env()) {
@@ -292,9 +293,9 @@ check_not_shared <- function(values, call = rlang::caller_env()) {
   }
 }
 
-# The first environment in a value or, if it is a list, in its elements: a list of `path` and
-# `object`. A class of R6 is an environment whose state nobody changes, and so are objects of this
-# package in a list, such as a client.
+# Finds the first environment in a value or, if the value is a list, in its elements. Returns a
+# list of `path` and `object`. It accepts R6 classes and, in a list, objects of this package such as
+# a client: these are environments, but nobody changes their state.
 shared_object <- function(value, path) {
   if (is.environment(value) && !inherits(value, "R6ClassGenerator")) {
     return(list(path = path, object = value))

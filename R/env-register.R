@@ -4,15 +4,15 @@
 #' and [env_registry()] then accept. It is registered until the end of the session. Registering an
 #' id again replaces the environment, even one of Gymnasium.
 #'
-#' If several sub-environments are played together, the environment of [gym_env()] is copied. Random
-#' numbers in `entry_point` use the same seed every time, so that it always makes the same
-#' environment. Draw values that should differ between episodes in `reset`.
+#' To play several sub-environments together, [rollout()] and searches copy the environment of
+#' [gym_env()]. Before each call of `entry_point`, its random generator gets the same seed, so it
+#' always makes the same environment. Draw values that should differ between episodes in `reset`.
 #'
 #' @param id The id, a string of letters, digits and `_.:/-`, such as `"Corridor-v0"`.
-#' @param entry_point The environment's maker: an environment of [gym_env()], or a function that
-#'   returns an environment.
+#' @param entry_point What makes the environment: an environment of [gym_env()], or a function that
+#'   returns one.
 #' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] can override.
-#'   For an environment of [gym_env()] they are values with which each `self` starts.
+#'   For an environment of [gym_env()], they replace values with which each `self` starts.
 #' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.
 #'   `NULL`, the default, keeps the environment's own limit.
 #' @param reward_threshold The mean return from which the environment counts as solved, a number.
@@ -80,7 +80,7 @@ gym_unregister <- function(id) {
   invisible(id)
 }
 
-# Making one ---------------------------------------------------------------------------
+# Making a registered environment ------------------------------------------------------
 
 #' Make a registered environment
 #'
@@ -120,7 +120,7 @@ make_registered <- function(id, arguments = list(), call = rlang::caller_env()) 
   env
 }
 
-# Another environment with the same functions and other values.
+# Returns a new environment with the same functions and other values.
 change_r_env <- function(env, changes, parameters, id, call) {
   definition <- definition_of(env)
   check_parameters(parameters, definition, id, call)
@@ -129,7 +129,7 @@ change_r_env <- function(env, changes, parameters, id, call) {
   r_env$new(definition)
 }
 
-# A value that the functions do not use would change nothing.
+# Refuses unknown values: the functions would ignore them.
 check_parameters <- function(given, definition, id, call = rlang::caller_env()) {
   known <- c(names(definition$parameters), if (definition$vectorized) "num_envs")
   strange <- setdiff(names(given), known)
@@ -145,7 +145,7 @@ refuse_argument <- function(strange, known, id, from, call) {
   }
 }
 
-# For gym_make(). `...` are the arguments that only a server's environment has.
+# Makes an environment for gym_make(). `...` are the arguments that only a server's environment has.
 make_registered_env <- function(id, arguments, seed, num_envs, wrappers, ..., call) {
   id <- with_wrappers(id, wrappers, call)
   check_for_r(id, list(...), call)
@@ -188,7 +188,7 @@ check_for_r <- function(id, servers, call = rlang::caller_env()) {
 registered_rows <- function(search = NULL) {
   ids <- as.character(names(the_session$environments))
   if (!is.null(search)) ids <- ids[grepl(tolower(search), tolower(ids), fixed = TRUE)]
-  # The part of the spec that is known without making the environment.
+  # The part of the spec that is known before the environment is made.
   specs <- lapply(the_session$environments[ids], function(registered) {
     made <- inherits(registered$entry_point, "gym_r_env")
     utils::modifyList(as.list(if (made) registered$entry_point$spec), registered$changes)
@@ -204,13 +204,13 @@ registered_rows <- function(search = NULL) {
   )
 }
 
-# A server has no access to an environment written in R.
+# For calls that need a server's environment.
 check_not_registered <- function(env_id, call = rlang::caller_env()) {
-  if (is_registered(env_id)) {
-    id <- given_id(env_id)$id
+  given <- given_id(env_id)
+  if (isTRUE(given$registered)) {
     abort_wrong("env_id", env_id, call,
-                "{id} is an environment written in R, which a server cannot make.",
-                i = "`gym_make(\"{id}\")` makes it here.")
+                "{given$id} is an environment written in R, which a server cannot make.",
+                i = "`gym_make(\"{given$id}\")` makes it here.")
   }
 }
 
@@ -224,11 +224,12 @@ check_not_registered <- function(env_id, call = rlang::caller_env()) {
 #' @param search A text to look for in the ids, ignoring case. If there is no match, similar ids are
 #'   listed. `NULL`, the default, lists all.
 #' @return A data frame with one row for each environment: `id` (a string), `max_episode_steps`
-#'   (integer, the limit of an episode, `NA` for none), `reward_threshold` (double, the mean return
-#'   from which it counts as solved, `NA` for none), `vectorised` (logical, whether it has its own
-#'   vector implementation), `extra` (a string, the extra of the server that it requires, such as
-#'   `"box2d"`, `NA` for none), `available` (logical, whether it can be made) and `reason` (a
-#'   string, why it cannot be made, or `NA`; older servers give none).
+#'   (integer, the step limit of an episode, `NA` for none), `reward_threshold` (double, the mean
+#'   return from which the environment counts as solved, `NA` for none), `vectorised` (logical,
+#'   whether it has its own vector implementation), `extra` (a string, the extra of the server that
+#'   the environment requires, such as `"box2d"`, `NA` for none), `available` (logical, whether the
+#'   server can make it) and `reason` (a string, why the server cannot make it, or `NA`; older
+#'   servers give no reasons).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -251,7 +252,7 @@ env_registry <- function(client = gym_client(), search = NULL) {
   rbind(servers[!servers$id %in% own$id, ], own, make.row.names = FALSE)
 }
 
-# The environments that were made ---------------------------------------------------------
+# The instances on a server ---------------------------------------------------------------
 
 #' List the environments on a server
 #'
@@ -262,8 +263,8 @@ env_registry <- function(client = gym_client(), search = NULL) {
 #' @return A data frame with one row for each environment of all clients, the oldest first:
 #'   `instance_id` (a string, for [env_close()] and the other classic calls), `name` (a string,
 #'   given by its owner in [gym_make()] or [env_create()], or `NA`), `env_id` (a string), `num_envs`
-#'   (integer, the number of sub-environments, `NA` for a single environment), `age` and `idle`
-#'   (double, the seconds since it was made and since it was last reset or stepped), `steps`
+#'   (integer, the number of sub-environments, `NA` for a single environment), `age` (double, the
+#'   seconds since it was made), `idle` (double, the seconds since its last reset or step), `steps`
 #'   (double, the number of steps, in all sub-environments together) and `watched` (logical, whether
 #'   somebody watches it).
 #' @section Errors: `gym_error_argument`, `gym_error_connection`.

@@ -4,11 +4,11 @@
 #'
 #' @inheritParams env_reset
 #' @param which For a vector environment: the number of the sub-environment to draw. The default is
-#'   1, the first. An environment's own vector implementation (`"vector_entry_point"`) draws all of
-#'   them at once, which the server allows for at most 16.
+#'   1, the first. An environment's own vector implementation (`"vector_entry_point"`) draws all
+#'   sub-environments at once. The server allows this for at most 16.
 #' @return An object of class `gym_frame`: an integer array of height x width x 3 (red, green, blue,
-#'   each 0 to 255), or x 1 (grey) or x 4 (the last is the opacity) for some environments. [plot()]
-#'   shows it, [as.raster()] converts it to a raster image.
+#'   each 0 to 255), for some environments height x width x 1 (grey) or x 4 (the last is the
+#'   opacity). [plot()] shows it, [as.raster()] converts it to a raster image.
 #' @section Errors: `gym_error_http_400` for an unknown instance, one that has not been reset yet
 #'   (code `reset_needed`) or that cannot be drawn (code `cannot_render`); `gym_error_connection`.
 #' @export
@@ -49,13 +49,13 @@ print.gym_frame <- function(x, ...) {
 
 # The frames of an episode ----------------------------------------------------------------
 
-# The frames of an episode, as kept by rollout(frames = TRUE): as PNG files, because a frame of
-# CartPole takes 3 MB as numbers and 3 kB as a PNG file.
+# rollout(frames = TRUE) keeps the frames of an episode as PNG files: a frame of CartPole takes 3 MB
+# as numbers and 3 kB as a PNG file.
 
 #' Make the frames of an episode
 #' @param files A list of PNG files, each a raw vector.
 #' @param fps The number of frames per second, `NULL` if the environment does not say.
-#' @return An object of class `gym_frames`, a list whose elements are unpacked by `[[`.
+#' @return An object of class `gym_frames`: a list of PNG files, which `[[` unpacks.
 #' @noRd
 new_frames <- function(files, fps = NULL) {
   structure(files, fps = fps, class = "gym_frames")
@@ -80,7 +80,7 @@ format.gym_frames <- function(x, ...) {
 
 # Pictures from the server --------------------------------------------------------
 
-# Checks before play whether the environment can be drawn.
+# Refuses, before play, an environment that cannot be drawn.
 check_draws <- function(env, call) {
   label <- environment_label(env)
   if (!is.null(env$num_envs)) {
@@ -100,7 +100,8 @@ check_draws <- function(env, call) {
   }
 }
 
-# The current frame, as the bytes of a PNG file. Its header says how much memory the pixels need.
+# The current frame, as the bytes of a PNG file. The check uses the size in the header, because
+# unpacking a huge picture would fill the memory.
 png_frame <- function(client, instance_id, call = rlang::caller_env()) {
   route <- paste0(instance_route(instance_id), "render/")
   file <- get_answer(client, route, call = call)$png
@@ -111,7 +112,7 @@ png_frame <- function(client, instance_id, call = rlang::caller_env()) {
   file
 }
 
-# The header of the file has width and height.
+# Width and height, from the header of the file.
 png_size <- function(file) readBin(file[17:24], "integer", 2L, endian = "big")
 
 #' Unpack a frame
@@ -128,7 +129,7 @@ frame_from_png <- function(file) {
 
 # The user's function either plots, on a png() device, or returns a picture.
 
-# The size of a plot in pixels: that of CartPole's frames.
+# The size of a plot in pixels, the same as that of CartPole's frames.
 plotted_size <- c(width = 600L, height = 400L)
 
 # A small picture, such as one pixel for each cell of a grid, is enlarged to about this width.
@@ -181,7 +182,8 @@ draw_sub_env <- function(sub_env, call) {
   }
 }
 
-# Runs code that plots on the device that `open` opens. The current device stays current.
+# Runs code that plots on the device that `open` opens. Afterwards, the device that was current
+# before is current again.
 on_device <- function(open, code) {
   before <- grDevices::dev.cur()
   open
@@ -198,7 +200,7 @@ on_device <- function(open, code) {
 frame_from_picture <- function(picture, sub_env, call) {
   tryCatch(
     {
-      # Numbers are shares of 1, or whole numbers up to 255.
+      # Numbers are from 0 to 1, or from 0 to 255.
       most <- if (is.numeric(picture) && max(picture, 0, na.rm = TRUE) > 1) 255 else 1
       raster <- if (is.numeric(picture)) as.raster(picture, max = most) else as.raster(picture)
       # The elements of a raster image are in rows.
@@ -215,7 +217,7 @@ frame_from_picture <- function(picture, sub_env, call) {
 
 # Watching and recording -------------------------------------------------------------------------
 
-# The page on which a server shows an environment, and how users open it.
+# A server shows an environment on a page. This opens the page for the user.
 
 #' Watch an environment
 #'
@@ -229,9 +231,9 @@ frame_from_picture <- function(picture, sub_env, call) {
 #'
 #' In an interactive session the page opens in RStudio's viewer or else in the browser. A script
 #' shows the address once per environment, as a message of class `gym_message_watch`.
-#' `options(gym.viewer = )` changes this, in scripts too: a function, such as [utils::browseURL()],
-#' is called with the address, and `FALSE` opens and shows nothing. If the server requires a token,
-#' the address contains a key for this page only.
+#' `options(gym.viewer = )` changes this, in scripts too. Give a function that takes the address,
+#' such as [utils::browseURL()], or `FALSE` to open and show nothing. If the server requires a
+#' token, the address contains a key for this page only.
 #'
 #' See `vignette("server", package = "gym")`, section "Watching", for the speed of the page and for
 #' who can open it.
@@ -267,7 +269,7 @@ open_watch <- function(instance, call = rlang::caller_env()) {
   }
   query <- if (!is.null(key)) paste0("?key=", key)
   address <- paste0(client$remote_base, instance$route, "watch/", query)
-  # Set this first, so that a viewer that fails does so only once.
+  # Set this first, so that a failing viewer fails only once.
   instance$shown <- TRUE
   comes <- FALSE
   if (open_address(address, viewer)) {
@@ -292,13 +294,13 @@ watcher_timeout <- 5
 #' From the next reset on, the server writes a row for each finished episode into a table,
 #' `episodes.csv`: its number, return, length in steps and seconds. It records videos of the
 #' episodes that `video_callable` selects. `env_monitor_close()`, or closing the environment, ends
-#' the monitor and finishes its files. Without a monitor it does nothing.
+#' the monitor and finishes its files. Without a monitor, `env_monitor_close()` does nothing.
 #'
 #' @section Files: A monitor has its own directory, with the table, `episodes.csv`, and videos named
-#'   by the number of their episode, such as `rl-video-episode-0.mp4`. If another monitor, of this
-#'   server or another one, writes in `directory`, the new one uses a directory below it with the
-#'   name of the `instance_id`, such as `1a2b3c4d`.
-#'   `list.files(directory, "^episodes[.]csv$", recursive = TRUE)` finds all tables.
+#'   by the number of their episode, such as `rl-video-episode-0.mp4`. If another monitor already
+#'   writes in `directory`, of this or another server, the new monitor uses a directory below it,
+#'   named by the `instance_id`, such as `1a2b3c4d`. `list.files(directory, "^episodes[.]csv$",
+#'   recursive = TRUE)` finds all tables.
 #' @inheritParams env_reset
 #' @param directory The directory for the server's files, a string: a path below the server's
 #'   directory for monitors (its option `--monitor-dir`), or, for a server on this machine, below
@@ -308,18 +310,18 @@ watcher_timeout <- 5
 #'   `gym_server_start(monitor_dir = "runs")`.
 #' @param force Delete the files of monitors that were closed or ended with their server? Files of
 #'   active monitors and all other files are never touched. The default is `FALSE`.
-#' @param resume Continue the numbering of an earlier monitor? This is the one of this instance if
-#'   it has a directory below, otherwise the first one. The default is `FALSE`, which refuses a
-#'   directory with the files of an earlier monitor.
+#' @param resume Continue the numbering of an earlier monitor? If this instance has its own
+#'   directory below `directory`, this is the monitor there, otherwise the one in `directory`
+#'   itself. The default, `FALSE`, refuses a directory with the files of an earlier monitor.
 #' @param video_callable Which episodes to record as videos: `FALSE`, the default, for none, `TRUE`
 #'   for all, or a whole number n for every n-th, starting with the first. Requires the server's
 #'   extra `video` (the Python package moviepy). The server keeps the frames of an episode in memory
-#'   until it ends: a thousand frames of CartPole are 720 MB.
+#'   until the episode ends: a thousand frames of CartPole take 720 MB.
 #' @return Nothing, invisibly.
 #' @section Errors: `gym_error_http_400` for an unknown instance, a directory that is refused, a
-#'   monitor that is already active, or videos that cannot be made, with the reason. If something
-#'   could not be recorded, the environment goes on, and closing either raises the error.
-#'   `gym_error_argument`; `gym_error_connection`.
+#'   monitor that is already active, or videos that cannot be made; the message gives the reason. If
+#'   the monitor fails to record something, play goes on. The error comes when you close the monitor
+#'   or the environment. `gym_error_argument`; `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
 #' env <- gym_make("CartPole-v1", seed = 1)

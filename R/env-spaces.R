@@ -1,15 +1,15 @@
 #' Get an environment's spaces
 #'
-#' `env_action_space_info()` returns the space of the actions, `env_observation_space_info()` that
-#' of the observations.
+#' `env_action_space_info()` returns the action space, `env_observation_space_info()` the
+#' observation space.
 #'
 #' @inheritParams env_reset
 #' @return A space: a list with the element `name` and, for Discrete, `n` (the number of values) and
 #'   `start` (the first of them), for Box, `shape`, `dtype`, `low` and `high`, the bounds row by
-#'   row, which may be infinite. For the other kinds see [space_sample()]. For a vector environment
-#'   it is the space of all sub-environments together: a Box of shape 4 becomes one of shape
-#'   `c(n, 4)`, a Discrete space a MultiDiscrete of shape `n`. Tuple and Dict have such parts. The
-#'   others become a Tuple with a space for each sub-environment.
+#'   row, which may be infinite. For the other kinds see [space_sample()]. A vector environment
+#'   returns the space of all sub-environments together: a Box of shape 4 becomes a Box of shape
+#'   `c(n, 4)`, a Discrete space becomes a MultiDiscrete space of shape `n`. The parts of a Tuple or
+#'   Dict change in the same way. Other spaces become a Tuple with a space for each sub-environment.
 #' @section Errors: `gym_error_http_400` for an unknown instance, `gym_error_connection`.
 #' @export
 #' @examplesIf gym:::can_start_server()
@@ -30,12 +30,12 @@ env_observation_space_info <- function(x, instance_id) {
 
 #' Draw a random action
 #'
-#' Draw an action from the environment's action space on the server, whose generator has the seed of
-#' the environment.
+#' The server draws an action from the environment's action space, with a generator that has the
+#' environment's seed.
 #'
 #' @inheritParams env_reset
 #' @return An action for [env_step()]: a whole number for Discrete, a numeric vector or array for
-#'   Box. [space_sample()] lists all kinds. In a vector environment an action for each
+#'   Box. [space_sample()] lists all kinds. A vector environment returns an action for each
 #'   sub-environment.
 #' @inheritSection env_action_space_info Errors
 #' @export
@@ -92,7 +92,7 @@ instance_contains <- function(x, instance_id, which, value, call = rlang::caller
 
 #' Find the spaces of an environment
 #'
-#' An environment given by its id is made for this and closed.
+#' If the environment is given by its id, this makes it and closes it.
 #' @return A list: `observation_space` and `action_space`, those of a single sub-environment, and
 #'   `spec`.
 #' @noRd
@@ -108,8 +108,8 @@ known_spaces <- function(env, client, call = rlang::caller_env()) {
   )
 }
 
-# Closes an environment that was made to get its spaces. An error before closing is more useful than
-# one from closing.
+# Closes an environment and ignores errors: an error before closing is more useful than one from
+# closing.
 close_quietly <- function(env) tryCatch(env$close(), gym_error = function(cnd) NULL)
 
 check_environment <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env()) {

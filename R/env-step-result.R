@@ -1,12 +1,12 @@
-# Checks of the results of a user's environment. They follow the same rules as the server's checks
-# of its environments.
+# Checks the results of a user's environment by the same rules as the server uses for its
+# environments.
 
 flags <- c("terminated", "truncated")
 
 is_server_env <- function(env) inherits(env, "gym_server_env")
 
-# Play does not need infos, so they are not requested from a server. Only a server's environment
-# takes a list of seeds.
+# Playing needs no infos, so this does not ask a server for them. Only a server's environment takes
+# a list of seeds.
 first_observation <- function(env, seed, ...) {
   if (is_server_env(env)) {
     if (is.list(seed)) class(seed) <- "gym_seed_lists"
@@ -36,9 +36,9 @@ take_step <- function(env, n, action, which = NULL, finals = TRUE) {
 
 #' Check the result of a step and complete it
 #'
-#' The only check of the steps of environments in R: [check_env()] finds the same problems.
+#' Every step of an environment written in R is checked here. [check_env()] uses the same rules.
 #' @param out The result of the user's `step()`.
-#' @param sub_env The sub-environment, which has counted the step.
+#' @param sub_env The sub-environment. It has already counted the step.
 #' @return A list of `observation`, `reward`, `terminated`, `truncated`, which includes the step
 #'   limit, and `info`.
 #' @noRd
@@ -55,7 +55,8 @@ complete_step <- function(out, sub_env, sub_env_number = NULL, call = rlang::cal
   )
 }
 
-# The place of a wrong result. It is put into words only when needed.
+# Says where a wrong result came from. It is a default argument, so this costs time only after a
+# mistake.
 step_place <- function(sub_env, sub_env_number = NULL) {
   in_sub_env <- if (!is.null(sub_env_number)) paste0(" (sub-environment ", sub_env_number, ")")
   paste0("`step()` of ", sub_env$traits$spec$id, " in step ", sub_env$taken, " of the episode",
@@ -82,8 +83,9 @@ checked_observation <- function(traits, observation, n, where, call) {
   tidy_value(space, observation, n)
 }
 
-# Observations have their order from the space. Names in another order are a mistake; other names
-# may come from the vectors that they were computed from.
+# The numbers of an observation must be in the order of the space. The same names in another order
+# are a mistake. Other names are ignored: they may come from the vectors that the user computed
+# with.
 check_order_of_names <- function(space, observation, n, where, call) {
   given <- if (is.null(n) || is.list(observation)) names(observation) else colnames(observation)
   if (!is.null(given) && !is.null(space$names) && !identical(given, space$names) &&
@@ -97,8 +99,8 @@ check_order_of_names <- function(space, observation, n, where, call) {
   }
 }
 
-# Whether a value or a batch of `n` fits, as is usual. `fits` checks batches: a single value is
-# checked as a batch of one.
+# A quick check whether a value, or a batch of `n`, fits. `fits` checks batches, so a single value
+# becomes a batch of one.
 fits_quickly <- function(space, value, n, fits) {
   if (is.null(n)) {
     if (!length(value) || !is.atomic(value) || !is.null(dim(value))) {
@@ -110,7 +112,7 @@ fits_quickly <- function(space, value, n, fits) {
   fits(value, n)
 }
 
-# Checks a value, or with `n` a batch, whose sub-environments are `which`.
+# Checks a value or, if there is an `n`, a batch for the sub-environments `which`.
 check_one_or_batch <- function(space, value, n, call, which = seq_len(n)) {
   if (is.null(n)) {
     check_value(space, value, "", call, bounds = TRUE)
@@ -137,7 +139,7 @@ refuse_observation <- function(cnd, space, where, call) {
 #' Check the elements of a step's result, except the observation
 #' @param n The number of sub-environments.
 #' @param where Who returned it and when, in words.
-#' @return The same; a missing `truncated` becomes FALSE if it is optional.
+#' @return The result. If `truncated` is optional and missing, it becomes FALSE.
 #' @noRd
 check_step_parts <- function(out, n, where, call,
                              needed = c("observation", "reward", "terminated")) {
@@ -161,9 +163,9 @@ check_step_parts <- function(out, n, where, call,
 }
 
 #' Find the wrong elements of a step's result
-#' @param finite Whether an infinite reward is wrong, too.
-#' @return The requirement for each of them, a character vector with their names; `NULL` if all are
-#'   correct.
+#' @param finite Whether infinite rewards count as wrong.
+#' @return What each wrong element must be, a character vector named by the elements; `NULL` if all
+#'   are right.
 #' @noRd
 wrong_parts <- function(out, n, finite = FALSE) {
   reward <- out$reward

@@ -1,23 +1,23 @@
-# Vector environments: selecting sub-environments by number or mask, stepping them, and the checks
-# of both.
+# Vector environments: their spaces, their infos, and checks of seeds, masks and numbers of
+# sub-environments.
 
 vectorization_modes <- c("vector_entry_point", "sync", "async")
 autoreset_modes <- c("NextStep", "SameStep", "Disabled")
 
-# The space of the values sent and received: for a vector environment that of a batch.
+# The space of the values sent and received. For a vector environment, it is the space of a batch.
 sent_space <- function(space, num_envs) {
   if (is.null(num_envs)) space else batch_space(space, num_envs)
 }
 
-# Whether values are sent as tensors. Those of a vector environment are if possible, but a
-# safetensors file needs at least one number.
+# Whether values are sent as tensors. A vector environment sends tensors if there is at least one
+# number, which a safetensors file needs; a single environment only if they are faster.
 travels_as_tensors <- function(space, num_envs) {
   isTRUE(count_numbers(space) >= if (is.null(num_envs)) tensors_pay_from else 1)
 }
 
 # Steps ---------------------------------------------------------------------------------
 
-# The server draws an action for each sub-environment.
+# Reads the actions that the server drew: one, or one for each sub-environment.
 decode_sample <- function(instance, json) {
   single <- instance$single_action_space
   if (is.null(instance$num_envs)) {
@@ -41,7 +41,7 @@ check_sub_env_seeds <- function(seed, num_envs, call) {
   }
 }
 
-# The mask as JSON. Rollouts often send the same one.
+# The mask as JSON. The last one is kept, because rollouts often send the same mask again.
 mask_json <- function(mask, instance, call) {
   if (is.null(mask)) {
     return(NULL)
@@ -88,9 +88,9 @@ check_is_vector_env <- function(instance, x, arg, call) {
 
 #' Convert the info of several sub-environments to R values
 #'
-#' For each key, Gymnasium has an array with an entry for each sub-environment, and under the key
-#' with a `_` before it a mask of those that have a value. Here the other entries are `NA`, or
-#' `NULL` in a list, and there are no masks.
+#' For each key, Gymnasium has an array with an entry for each sub-environment. A second key, with a
+#' `_` in front, has a mask that says which sub-environments have a value. In R, entries without a
+#' value are `NA`, or `NULL` in a list, and there are no masks.
 #' @noRd
 info_by_sub_env <- function(json, n) {
   if (!length(json)) {
@@ -110,7 +110,8 @@ info_of_sub_envs <- function(json, mask, n) {
   if (length(mask) != n || length(json) != n) {
     return(info_from_json(json))
   }
-  # Only the values selected by the mask determine the type: the others are zero or nothing.
+  # Only the values that the mask selects determine the type: Gymnasium fills the others with zero
+  # or None.
   values <- info_from_json(json[mask])
   entry <- rep(NA_integer_, n)
   entry[mask] <- seq_len(sum(mask))

@@ -1,8 +1,8 @@
-# Resets and steps of an instance: check and write the arguments, perform the request, and read,
-# check and name the result. The request is prepared once for each combination of a call's flags.
+# Resets and steps of an instance: check and write the arguments, send the request, and read, check
+# and name the result. A request is prepared once for each combination of a call's flags.
 
 #' Start an episode
-#' @param named Whether observations have names: those of the classic calls do not.
+#' @param named Whether observations get names. The classic calls return them without names.
 #' @param infos Whether the server makes infos.
 #' @noRd
 reset_instance <- function(instance, seed, options, return_info = FALSE, mask = NULL,
@@ -16,7 +16,7 @@ reset_instance <- function(instance, seed, options, return_info = FALSE, mask = 
     },
     reset_mask = mask_json(mask, instance, call)
   )
-  # A place for each combination of the flags.
+  # Each combination of the flags has its own slot.
   slot <- 1L + named + 2L * infos
   request <- instance$resets[[slot]]
   if (is.null(request)) {
@@ -43,10 +43,10 @@ prepare_reset <- function(instance, named, infos) {
 
 #' Take a step
 #' @inheritParams reset_instance
-#' @param finals Whether the server sends the last observations of episodes after which another one
-#'   began.
-#' @param check_ended Raises an error if the environment has ended with its server. It is evaluated
-#'   if there is no answer.
+#' @param finals Whether the server sends the last observation of an episode if the next one began
+#'   in the same step.
+#' @param check_ended An expression that raises an error if the environment has ended with its
+#'   server. It is evaluated only if no answer comes.
 #' @noRd
 step_instance <- function(instance, action, which = NULL, render = FALSE, named = FALSE,
                           infos = TRUE, finals = TRUE, call = rlang::caller_env(),
@@ -79,7 +79,7 @@ step_instance <- function(instance, action, which = NULL, render = FALSE, named 
 prepare_step <- function(instance, which, render, named, infos, finals) {
   n <- instance$num_envs
   selects <- length(which) && length(which) < n
-  # The number of those that step.
+  # The number of sub-environments that step.
   if (selects) n <- length(which)
   single <- instance$single_action_space
   actions <- sent_space(single, n)
@@ -115,10 +115,11 @@ prepare_step <- function(instance, which, render, named, infos, finals) {
 
 #' Ask an instance for a reset or a step, by its stream or by HTTP
 #'
-#' @param request An environment with functions: `new_message` describes its messages; `content`
-#'   checks a value that these cannot write, and returns the fields of a body, or tensors; `read`
-#'   returns the result of an answer that they cannot read. And the constant `fields` of such a body
-#'   (JSON texts), and whether it `sends_tensors`.
+#' @param request An environment with three functions: `new_message` describes the fast messages,
+#'   see [step_message()]; `content` checks a value that such a message cannot write, and returns
+#'   the fields of a body, or tensors; `read` returns the result of an answer that such a message
+#'   cannot read. It also has the constant `fields` of the body (JSON texts), and whether it
+#'   `sends_tensors`.
 #' @param value The action, or the fields of a reset.
 #' @noRd
 ask_instance <- function(instance, request, value, call, check_ended = NULL) {
@@ -146,7 +147,7 @@ ask_instance <- function(instance, request, value, call, check_ended = NULL) {
   by_http(post_message(stream, message, content, head, result, call))
 }
 
-# What a message holds that is not an array.
+# The body of a message whose value is not sent as plain arrays.
 request_body <- function(request, content) {
   if (!request$sends_tensors) {
     return(json_body(c(content, request$fields)))

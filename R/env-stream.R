@@ -1,11 +1,11 @@
-# The messages of steps and resets, by a stream or by HTTP, and how the answers are read. Usual
-# answers are numbers of one dtype, which R reads at once.
+# The messages of steps and resets, by a stream or by HTTP, and how to read their answers. Usual
+# answers are numbers of one dtype, which R reads in one call.
 
-# With more numbers the head of a frame would have more bytes than [numbers_message()] expects.
+# With more numbers, the head of a WebSocket frame would be longer than numbers_message() expects.
 most_as_float64 <- 8000
 
-# Whether answers come as float64: R's integers and doubles can represent all of them, and they fit
-# into a frame that is read at once.
+# Whether the server can answer in float64: R must be able to represent all values, and the answer
+# must fit into a frame that R reads in one call.
 takes_numbers <- function(space, num_envs) {
   if (!isTRUE((num_envs %||% 1L) * (count_numbers(space) + 3) <= most_as_float64)) {
     FALSE
@@ -23,7 +23,7 @@ small_dtypes <- c("int8", "int16", "uint8", "uint16")
 #' @param layout From [message_layout()].
 #' @param n The number of sub-environments that step, `NULL` for a single environment.
 #' @return A list for [ask_stream()], with `write`, a function of an action that returns its bytes,
-#'   or `NULL` for one that `request` must check.
+#'   or `NULL` if `request` must check the action.
 #' @noRd
 step_message <- function(instance, request, layout, n, render, named, infos, finals) {
   num_envs <- instance$num_envs
@@ -50,7 +50,7 @@ step_message <- function(instance, request, layout, n, render, named, infos, fin
   message
 }
 
-# A layout of as many rows as there are sub-environments, for `n` of them.
+# Converts a layout for all sub-environments to one for `n` of them.
 layout_of_rows <- function(layout, n, num_envs) {
   if (identical(n, num_envs)) {
     return(layout)
@@ -73,7 +73,7 @@ reset_message <- function(instance, request, layout, named) {
   } else {
     arrays_message(request, layout$reset)
   }
-  # Its fields are always written as JSON.
+  # The fields of a reset are always written as JSON.
   c(message, list(write = function(fields) NULL, what = 1L))
 }
 
@@ -84,16 +84,16 @@ has_numbers <- function(layout) {
     all(vapply(layout, function(entry) entry$dtype == "F64", NA))
 }
 
-# The numbers of the heads of the frame and the message.
+# The heads of the frame and of the message are together as long as three numbers.
 before_numbers <- 3L
 
-# The fewest numbers of an answer.
+# An answer has at least this many numbers.
 fewest_numbers <- 14L
 
 #' Describe answers that are numbers of one dtype
 #' @param request As for [step_message()].
 #' @param count How many numbers there are.
-#' @param read A function of the numbers of a message, its heads included, and of its JSON.
+#' @param read A function of the numbers of a message, including its heads, and of its JSON.
 #' @noRd
 numbers_message <- function(request, count, read) {
   count <- before_numbers + max(count, fewest_numbers)
@@ -103,7 +103,7 @@ numbers_message <- function(request, count, read) {
     count = count, read = read, request = request,
     usual = readBin(first, "double", endian = "little"),
     read_bytes = function(content, json) {
-      # As with the head of a frame.
+      # Four bytes stand for the head of the frame, which is not in `content`.
       numbers <- readBin(c(raw(4L), content), "double", count, endian = "little")
       if (length(numbers) < count) abort_answer("It has fewer numbers than its layout")
       read(numbers, json)

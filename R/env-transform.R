@@ -1,8 +1,8 @@
 # Wrappers that call a user's function in each step, named as in Gymnasium. The function gets
-# batches; a single environment has a batch of one. They wrap environments in R and those of a
-# server (env-wrapped-server.R).
+# batches; for a single environment, a batch of one. The wrappers go around environments in R and
+# environments of a server (env-wrapped-server.R).
 
-# The arguments that each function may have; the first one is what it changes.
+# The arguments that the function of each wrapper may have. It changes the first one.
 transforms <- list(
   TransformReward = c("reward", "observation", "action", "next_observation", "terminated",
                       "truncated"),
@@ -30,7 +30,8 @@ wrap_transform_reward <- function(traits, func, call) {
   }
   around <- function(inner, n, next_step) {
     seen <- observation_memory(transform, traits, n)
-    # With autoreset_mode "NextStep" the step after the end of an episode only resets.
+    # With autoreset_mode "NextStep", the step after the end of an episode only resets: its reward
+    # stays as it is.
     ended <- logical(n)
     list(
       reset = function(..., mask = NULL) {
@@ -94,7 +95,8 @@ wrap_transform_observation <- function(traits, func, observation_space = NULL, c
   list(traits = changed, around = around_batches(traits, changed, around))
 }
 
-# If another episode began in the same step, the last observation of the previous one is different.
+# If the step also started the next episode, the last observation of the previous one must be
+# changed separately.
 change_final <- function(out, observation, inside, outside, change) {
   final <- out$next_observation
   out$next_observation <- observation
@@ -140,7 +142,7 @@ wrap_transform_action <- function(traits, func, action_space = NULL, call) {
   list(traits = changed, around = around_batches(traits, changed, around))
 }
 
-# The last observation of each sub-environment, before the next action, if the function asks for it.
+# Keeps the current observation of each sub-environment, if the function asks for it.
 observation_memory <- function(transform, traits, n) {
   asked <- transform$asks("observation")
   space <- traits$observation_space
@@ -165,10 +167,11 @@ observation_memory <- function(transform, traits, n) {
 #' Make the function that wraps the methods of an environment
 #'
 #' @param inside,outside The traits of the wrapped environment, and of the result.
-#' @param around A function of `inner`, whose functions take and return batches, of the number of
-#'   sub-environments, and of whether the step after an end only resets. It returns such functions.
-#' @return A function like `around` of `r_wrappers`. An environment of a server is its third
-#'   argument: its results are already checked.
+#' @param around A function that returns the wrapped functions. Its arguments are `inner`, whose
+#'   functions take and return batches; the number of sub-environments; and whether the step after
+#'   the end of an episode only resets.
+#' @return A function like `around` of `r_wrappers`. Its third argument is an environment of a
+#'   server, or `NULL`; the results of a server are already checked.
 #' @noRd
 around_batches <- function(inside, outside, around) {
   function(inner, num_envs, env = NULL) {
@@ -205,8 +208,8 @@ convert_functions <- function(inner, observation, action) {
 #' Prepare the function of a wrapper
 #'
 #' @return A list: `wrapper`, its name; `asks(part)`, whether the function needs this part; and
-#'   `ask(parts, n, fit)`, a function of a list of batches with `n` rows, which returns `fit()` of
-#'   the function's result and of `n`.
+#'   `ask(parts, n, fit)`, which calls the function with a list of batches of `n` rows, and returns
+#'   `fit(result, n)`.
 #' @noRd
 new_transform <- function(wrapper, func, traits, call) {
   asked <- asked_parts(wrapper, func, call)
@@ -235,7 +238,7 @@ new_transform <- function(wrapper, func, traits, call) {
     compares <- n > 1L && calls %in% compared_at
     before <- if (compares) session_random_state()
     value <- answer(parts, n, fit)
-    # Random numbers for a row alone would differ.
+    # A function that draws random numbers cannot be compared: it would draw others for one row.
     if (compares && identical(session_random_state(), before)) {
       last_row <- function(part, name) {
         space <- switch(sub("next_", "", name), action = traits$action_space,
@@ -251,8 +254,8 @@ new_transform <- function(wrapper, func, traits, call) {
 }
 
 #' Find the parts that a function needs
-#' @return The names of the parts, named by the arguments that get them. The only argument of a
-#'   function may have any name, and gets the part that the wrapper changes.
+#' @return The names of the parts, named by the arguments that get them. If the function has only
+#'   one argument, this may have any name, and gets the part that the wrapper changes.
 #' @noRd
 asked_parts <- function(wrapper, func, call) {
   known <- transforms[[wrapper]]
@@ -265,7 +268,7 @@ asked_parts <- function(wrapper, func, call) {
   asked <- intersect(names, known)
   needed <- setdiff(names[vapply(declared, is_without_default, NA)], c(known, "..."))
   if (!length(asked)) {
-    # Not `obs`, which stands for another part.
+    # An abbreviation such as `obs` may mean another part: it is an error.
     stands_for_other <- length(needed) == 1L && any(startsWith(known[-1L], needed))
     if (!stands_for_other && (length(needed) == 1L || !length(needed) && length(names))) {
       return(known[[1L]])
@@ -281,8 +284,8 @@ asked_parts <- function(wrapper, func, call) {
   stats::setNames(asked, asked)
 }
 
-# A function that takes `observation[1]` for a number of its own row would return wrong numbers
-# without an error.
+# Warns if a row alone gives another value than among others. A function that uses `observation[1]`
+# as if there were one row would return wrong numbers without an error.
 differs_alone <- function(transform, value, alone, n) {
   numbers <- function(x) unlist(x, use.names = FALSE)
   among <- numbers(if (is.list(value)) lapply(value, rows_of, n) else rows_of(value, n))
@@ -301,7 +304,7 @@ differs_alone <- function(transform, value, alone, n) {
 # Converts the result of a function to a batch.
 form_batch <- function(space, value, n) {
   value <- as_batch(space, value)
-  # One row of a matrix, without `drop = FALSE`.
+  # The user may have selected one row of a matrix without `drop = FALSE`.
   if (n == 1L && is_stackable(space) && is.null(dim(value)) && length(space$shape) == 1L &&
         length(value) == space$shape) {
     dim(value) <- c(1L, length(value))
@@ -311,7 +314,7 @@ form_batch <- function(space, value, n) {
 
 # Errors about what a function returns --------------------------------------------------
 
-# Columns in another order would get each other's names.
+# If the function changes the order of the columns, they would get wrong names.
 check_names_order <- function(transform, space, observation) {
   given <- colnames(observation) %||% names(observation)
   if (!is.null(given) && setequal(given, space$names) && !identical(given, space$names)) {

@@ -1,15 +1,15 @@
-#' Construct a vector environment, the one thing that everything plays
+#' Construct a vector environment, the interface of everything that plays
 #'
-#' The arguments are its elements. [as_vector_env()] says what the first ones promise; those without
-#' a default are always there. Play adds `call`, the user's call, which errors name, and `recipe`,
-#' see [environment_recipe()]. Models add `model`, `possible` and `endless`.
+#' The arguments are its elements; [as_vector_env()] describes most of them. Functions that play add
+#' `call`, the user's call, which errors name, and `recipe`, see [environment_recipe()]. Models add
+#' `model`, `possible` and `endless`.
 #' @param reset,step `NULL` only with `description`.
 #' @param step_one If there is one sub-environment: a function of one action that returns a step.
-#' @param guard If that is in R: a function that evaluates many such steps and adds the place to
-#'   their errors.
-#' @param description What a server needs to play whole episodes itself, see [describe_env()]; it
-#'   then also has `known`, what is known about the environment, and `make_stepped()`, which makes
-#'   the environment that R steps.
+#' @param guard For `step_one` of an environment in R: a function that evaluates many steps and says
+#'   in which one the user's functions raised an error.
+#' @param description What a server needs to play whole episodes itself, see [describe_env()]. The
+#'   vector environment then also has `known`, the size of the last request, and `make_stepped()`,
+#'   which makes the environment that R steps.
 #' @noRd
 new_vector_env <- function(observation_space, action_space, spec, num_envs, batch_size, one_seed,
                            reset = NULL, step = NULL, step_bare = NULL, begins_next = FALSE,
@@ -19,9 +19,9 @@ new_vector_env <- function(observation_space, action_space, spec, num_envs, batc
   structure(mget(names(formals())), class = "gym_vector_env")
 }
 
-# Seeing one as a vector environment ---------------------------------------------------
+# Environments as vector environments -------------------------------------------------
 
-#' Convert an environment that was made before to a vector environment
+#' Convert an existing environment to a vector environment
 #'
 #' @param batch_size The number of episodes in a batch if each sub-environment has its own seed;
 #'   `NULL` to derive it from the number of sub-environments.
@@ -52,7 +52,7 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
   if (frames) {
     check_draws(env, call)
     parts$frame <- function() png_frame(env$client, env$instance_id, call)
-    # The last frame of an episode is drawn before the next one begins.
+    # The next episode must not begin before the last frame of this one is drawn.
     parts$begins_next <- FALSE
   }
   rlang::exec(
@@ -62,8 +62,8 @@ vector_env_of <- function(env, frames = FALSE, batch_size = NULL, call = rlang::
 }
 
 # The number of episodes in a batch for sub-environments with their own seeds. With four episodes
-# each, few sub-environments are idle while the last episodes end. With a single one, an interrupt
-# loses no finished episode.
+# for each, few sub-environments are idle while the last episodes end. A single sub-environment has
+# one episode in a batch, so that an interrupt loses no finished episode.
 episodes_of_batch <- function(num_envs) {
   as.integer(if (num_envs == 1L) 1L else 4L * num_envs)
 }
@@ -85,13 +85,13 @@ single_env <- function(env) {
   )
 }
 
-# With "sync" and "async" each sub-environment is an environment with its own seed, and only those
-# that play are stepped. Only a server's environments have `num_workers`; others need not be able to
-# start an episode themselves.
+# With "sync" and "async", each sub-environment has its own seed, and only those that play take a
+# step. Only a server's environments have `num_workers`, so only these are relied on to start the
+# next episode themselves.
 independent_sub_envs <- function(env) {
   n <- env$num_envs
   space <- env$single_observation_space
-  # The first reset is for all, because none has an episode yet.
+  # The first reset is for all, because no sub-environment has an episode yet.
   was_reset <- FALSE
   reset <- function(seeds, which) {
     some <- was_reset && length(which) < n
@@ -118,9 +118,9 @@ independent_sub_envs <- function(env) {
   )
 }
 
-# Makes the function `step_bare()`, for sub-environments that stop after their last episode. Each
-# new set of sub-environments needs a new request, which takes time to prepare. So those that have
-# stopped are still stepped, and their results ignored, until fewer than half of the set play.
+# Makes the function `step_bare()`. Sub-environments stop after their last episode, and each new set
+# of them needs a new request, which takes time to prepare. So this steps the ones that have
+# stopped, too, and ignores their results, until at most half of the set play.
 bare_stepper <- function(env) {
   n <- env$num_envs
   actions <- env$single_action_space
@@ -141,7 +141,7 @@ bare_stepper <- function(env) {
 
 # Some rows of the result of a step.
 rows_of_step <- function(space, out, row) {
-  # The two are nearly always the same object, which identical() detects at once.
+  # Usually both are the same object, which identical() sees at once.
   same <- identical(out$observation, out$next_observation)
   observation <- batch_rows(space, out$observation, row)
   list(
@@ -151,8 +151,8 @@ rows_of_step <- function(space, out, row) {
   )
 }
 
-# With "vector_entry_point" all sub-environments share one generator and one seed. All are always
-# stepped, including those whose episode has ended; their results are ignored.
+# With "vector_entry_point", all sub-environments share one generator and one seed. Each step steps
+# all of them; the results of those whose episode has ended are ignored.
 joint_sub_envs <- function(env) {
   n <- env$num_envs
   observed <- env$single_observation_space
@@ -171,8 +171,8 @@ joint_sub_envs <- function(env) {
   )
 }
 
-# The actions of all sub-environments: those that have ended repeat the action of the first that
-# plays.
+# The actions of all sub-environments. Those whose episode has ended repeat the action of the first
+# that plays.
 actions_of_all <- function(space, action, which, n) {
   if (length(which) == n) {
     return(action)

@@ -1,6 +1,6 @@
-# Environments of a server with wrappers that call R functions. R plays them step by step.
+# A server's environments inside wrappers that call R functions. R plays them step by step.
 
-# Wraps an environment of a server, which stays the same instance.
+# Wraps an environment of a server. The instance on the server stays the same.
 wrap_server_env <- function(env, wrapper, arguments, call) {
   if (!wrapper %in% names(transforms)) {
     abort_wrong("wrapper", wrapper, call,
@@ -30,7 +30,8 @@ wrapped_server_env <- R6Class(
       self$single_action_space <- traits$action_space
       private$env <- env
       private$traits <- traits
-      # The wrapped view of the instance, whose actions have other meanings.
+      # The instance as seen from outside the wrapper. If its action space is new, the documented
+      # meanings of actions do not apply.
       private$instance <- list(
         client = env$client, num_envs = env$num_envs, spec = if (!renames) traits$spec,
         single_action_space = traits$action_space,
@@ -74,7 +75,7 @@ wrapped_server_env <- R6Class(
   }),
   private = list(
     env = NULL, traits = NULL, functions = NULL, info = NULL,
-    # The actions as the wrapper's function gets them.
+    # Checks actions and converts them to the form that the wrapper's function gets.
     take_action = function(action, which, call) {
       check_which(which, private$instance, call)
       action <- numbered_actions(private$instance, action, call)
@@ -86,14 +87,14 @@ wrapped_server_env <- R6Class(
   )
 )
 
-# By name ----------------------------------------------------------------------------------
+# Wrappers by their names ------------------------------------------------------------------
 
 #' Split wrappers into those applied by the server and those applied in R after them
 #' @return A list of two lists, `server` and `r`.
 #' @noRd
 split_wrappers <- function(wrappers, call) {
   in_r <- wrapper_names(wrappers) %in% names(transforms)
-  # A function cannot be sent to the server.
+  # R functions cannot be sent to the server.
   takes_function <- function(wrapper) any(vapply(wrapper, is.function, NA))
   wrong <- Filter(takes_function, wrappers[!in_r])
   if (length(wrong)) {

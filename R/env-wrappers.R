@@ -1,59 +1,62 @@
 #' Wrap an environment before it is made
 #'
 #' Add a wrapper of Gymnasium to an environment before [gym_make()], [env_create()], [rollout()] or
-#' [search_random()] makes it: a step limit, a scale for its actions, a smaller picture. Three
-#' wrappers call an R function, for example one that shapes rewards. Use the pipe to add several, in
-#' the order in which they are applied. R sees the spaces of the wrapped environment. A
-#' `"TimeLimit"` can only lower the environment's own step limit;
-#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
+#' [search_random()] makes it, for example to limit the steps, scale the actions or shrink the
+#' pictures. Three wrappers call an R function, for example one that shapes rewards. Use the pipe to
+#' add several: the first is the innermost. The spaces in R are those of the wrapped environment. A
+#' `"TimeLimit"` can only lower the environment's own step limit; `gym_make("MountainCar-v0",
+#' max_episode_steps = 1000)` raises it.
 #'
 #' # R functions
 #'
 #' These wrappers call your function in each step, around any environment:
-#' * `"TransformReward"`: `func` returns the new rewards. It gets `reward`, and those of
-#'   `observation` (before the action), `action`, `next_observation`, `terminated` and `truncated`
-#'   that are among its arguments. The environment's `reward_threshold` is dropped, because it is
-#'   about the original rewards.
-#' * `"TransformObservation"`: `func` gets `observation` and returns the new observations. Give
-#'   their `observation_space` if it is a different one.
+#' * `"TransformReward"`: `func` returns the new rewards. Its arguments can be `reward`,
+#'   `observation` (before the action), `action`, `next_observation`, `terminated` and `truncated`,
+#'   by these names. The environment loses its `reward_threshold`, which is about the original
+#'   rewards.
+#' * `"TransformObservation"`: `func` gets `observation` and returns the new observations. If their
+#'   space is different, give it as `observation_space`.
 #' * `"TransformAction"`: `func` gets `action`, and optionally `observation`, and returns the
-#'   actions for the environment. Give the `action_space` of its argument if it is a different one.
+#'   actions for the environment. If the actions that it gets have a different space, give it as
+#'   `action_space`.
 #'
 #' `func` gets batches, even for a single environment: rewards as a vector, observations in the form
-#' for policies (see [act()]). It returns as many values, which should depend on its arguments only.
-#' Its only argument may have any name. A file of [saveRDS()] does not contain the variables and
-#' functions of the session that it uses: define them again before you play on in another session.
+#' for policies (see [act()]). It returns as many values, which should depend only on its arguments.
+#' If it has only one argument, this can have any name. A file of [saveRDS()] does not contain the
+#' variables and functions of the session that `func` uses: define them again before you continue in
+#' another session.
 #'
 #' R plays a wrapped environment of Gymnasium step by step (see [rollout()]). This is slower than
-#' playing on the server, and learners of tables play instead of sampling from a model. The server's
-#' wrappers are applied first, inside. If you wrap an environment of [gym_make()], the result is the
-#' same instance. The classic calls ignore these wrappers.
+#' playing on the server, and agents with a table of values step the environment instead of sampling
+#' from its model. Wrappers of the server come first, inside these three. If you wrap an environment
+#' of [gym_make()], the result is the same instance. The classic calls ignore these wrappers.
 #'
 #' # Environments written in R
 #'
-#' An environment of [gym_env()] is wrapped at once; the result is a new environment with the same
-#' functions. An id from [gym_register()] is wrapped when it is made. Its wrappers are the three
-#' above and `"TimeLimit"`, with `max_episode_steps`, the number of steps after which an episode is
-#' cut off. A wrapper that remembers more than one step is an environment of its own, see
-#' `vignette("own-environment")`.
+#' If you wrap an environment of [gym_env()], the result is a new environment with the same
+#' functions. If you wrap an id from [gym_register()], [gym_make()] applies the wrapper later. The
+#' possible wrappers are the three above and `"TimeLimit"`, whose argument `max_episode_steps` is
+#' the number of steps after which an episode is cut off. To wrap with a memory of more than one
+#' step, write a new environment, see `vignette("own-environment")`.
 #'
 #' @param env_id The environment's id, a string such as `"CartPole-v1"`, or the result of
-#'   `gym_wrap()` for one; an environment written in R; or, for a wrapper with an R function, one
-#'   made by [gym_make()].
-#' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. The server decides which are
-#'   allowed; the error for an unknown one lists them. [Gymnasium's
+#'   `gym_wrap()` for an id; an environment written in R; or, for a wrapper with an R function, an
+#'   environment made by [gym_make()].
+#' @param wrapper The wrapper's name, a string such as `"TimeLimit"`. The server decides which
+#'   wrappers are allowed; the error for an unknown name lists them. [Gymnasium's
 #'   documentation](https://gymnasium.farama.org/api/wrappers/) describes their arguments.
 #' @param ... The wrapper's arguments, by name. A vector of length one is sent as a single value;
 #'   wrap it in `I()` to send a list of one.
 #' @return For an id, an object of class `gym_wrapped`, which prints in one line: a list of `env_id`
 #'   and `wrappers`. For an environment, another environment.
 #' @section Errors: `gym_error_argument`, also for a wrapper or an argument that does not exist for
-#'   environments written in R, and for a wrapper of the server outside one that calls an R
-#'   function. The server's errors come when the environment is made, see [env_create()]. During
-#'   play, `gym_error_wrapper` if `func` raises an error (with that error's classes) or returns an
-#'   invalid value.
-#' @section Warnings: `gym_warning_wrapper` if `func` gives a row another value alone than among
-#'   others, as `observation[1]` instead of `observation[, 1]` does.
+#'   environments written in R, and for a wrapper of the server around one that calls an R function.
+#'   The server's errors come later, when the environment is made, see [env_create()]. During play,
+#'   `gym_error_wrapper` if `func` raises an error (with that error's classes) or returns an invalid
+#'   value.
+#' @section Warnings: `gym_warning_wrapper` if `func` returns another value for a row alone than for
+#'   the same row among others, for example because of `observation[1]` instead of `observation[,
+#'   1]`.
 #' @export
 #' @examples
 #' wrapped <- "CartPole-v1" |>
@@ -66,10 +69,8 @@
 #' env$reset()
 #' env$close()
 #'
-#' # A car that is paid for being fast.
-#' fast <- "MountainCar-v0" |>
-#'   gym_wrap("TransformReward", func = function(reward, next_observation) {
-#'     reward + 10 * abs(next_observation[, "velocity"])
+#' # Reward the car for its speed. fast <- "MountainCar-v0" |> gym_wrap("TransformReward", func =
+#' function(reward, next_observation) { reward + 10 * abs(next_observation[, "velocity"])
 #'   })
 #' rollout(fast, policy_random(), episodes = 10, seed = 1)
 gym_wrap <- function(env_id, wrapper, ...) {
@@ -95,7 +96,7 @@ gym_wrap <- function(env_id, wrapper, ...) {
   wrapped
 }
 
-# An id with further wrappers.
+# Adds wrappers to an id.
 with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
   if (!inherits(env_id, "gym_wrapped")) {
     check_string(env_id, call = call)
@@ -109,12 +110,13 @@ with_wrappers <- function(env_id, wrappers, call = rlang::caller_env()) {
   env_id
 }
 
-#' Look at an environment that is given by its id
+#' Describe an environment that is given by its id
 #'
-#' @return `NULL` for an environment that was made. Otherwise a list: `id`, without wrappers;
-#'   `wrappers`, those that [gym_wrap()] has recorded; `remembers`, the names of those whose results
-#'   depend on earlier episodes; `calls_r`, whether one of them calls an R function; `registered`,
-#'   whether it is written in R and registered in this session, which a server cannot know.
+#' @return `NULL` for an environment that exists already. Otherwise a list: `id`, without wrappers;
+#'   `wrappers`, the wrappers that [gym_wrap()] has recorded; `remembers`, the names of the wrappers
+#'   whose results depend on earlier episodes; `calls_r`, whether a wrapper calls an R function;
+#'   `registered`, whether the environment is written in R and registered in this session, so that a
+#'   server does not know it.
 #' @noRd
 given_id <- function(env) {
   wrapped <- inherits(env, "gym_wrapped")
@@ -133,28 +135,28 @@ given_id <- function(env) {
 
 is_registered <- function(env) isTRUE(given_id(env)$registered)
 
-# Whether it is given by an id that a server knows.
+# Whether an environment is given by an id that a server may know.
 is_made_by_server <- function(env) isFALSE(given_id(env)$registered)
 
 wrapper_names <- function(wrappers) vapply(wrappers, function(wrapper) wrapper[[1L]], "")
 
-# Those of the wrappers whose results depend on earlier episodes.
+# The names of the wrappers whose results depend on earlier episodes.
 remembering <- function(names) {
   as.character(intersect(names, c("NormalizeObservation", "NormalizeReward")))
 }
 
-# The name of an environment in prints, with the wrappers around it: returns depend on these, too.
+# The printed name of an environment. It includes the wrappers, because returns depend on them.
 wrapped_id <- function(env_id, wrappers) paste(c(env_id, wrappers), collapse = " |> ")
 
-# The same name, for the environment of a result or a policy; `NULL` if it is unknown.
+# The printed name of the environment of a result or a policy; `NULL` if it is unknown.
 env_text <- function(x) if (!is.null(x$env_id)) wrapped_id(x$env_id, wrappers_around(x))
 
 wrappers_around <- function(x) x$wrappers %||% x$provenance$wrappers
 
 #' Name the environments of several results
 #' @param results A list of results with an element `env_id`.
-#' @return A string for each different `env_id`, named by it. Several environments that differ by
-#'   their wrappers alone are named in one string.
+#' @return A string for each different `env_id`, with the ids as names. Environments that differ
+#'   only by their wrappers share a string.
 #' @noRd
 env_names <- function(results) {
   ids <- vapply(results, function(x) x$env_id, "")
@@ -197,11 +199,11 @@ wrappers_json <- function(wrappers) {
 
 # Around environments written in R ----------------------------------------------------------
 
-# A wrapper is made by a function of the traits of the wrapped environment and of its arguments. It
-# returns a list: `traits`, those of the result, and `around`, a function of `inner` (a list of the
-# functions `reset` and `step` of a sub-environment) and `num_envs` (`NULL` if not vectorised),
-# which returns the wrapped functions. It is called for each sub-environment, so each has its own
-# state.
+# Each function makes a wrapper from the traits of the inner environment and the wrapper's
+# arguments. It returns a list: `traits`, those of the wrapped environment, and `around`, which
+# wraps the functions of a sub-environment. `around` gets `inner` (a list of the functions `reset`
+# and `step`) and `num_envs` (`NULL` if not vectorised), and returns such a list. It is called once
+# for each sub-environment, so each has its own state.
 r_wrappers <- list(
   TimeLimit = function(traits, max_episode_steps, call) {
     check_count(max_episode_steps, call = call)
@@ -268,9 +270,9 @@ check_r_wrapper <- function(wrapper, call) {
   }
 }
 
-# The functions of an environment in R, whose results are checked before another function of the
-# user gets them. In a vectorised one, sub-environments whose episode has ended may return anything;
-# the result of a running one replaces theirs.
+# Checks the results of an environment in R before the function of a wrapper gets them. In a
+# vectorised environment, a sub-environment whose episode has ended may return anything; the result
+# of a running one replaces its result.
 checked_functions <- function(inner, traits, num_envs) {
   force(inner)
   n <- num_envs %||% 1L
@@ -300,7 +302,7 @@ checked_functions <- function(inner, traits, num_envs) {
   )
 }
 
-# Marks errors that already name their origin.
+# Marks errors that already say where they come from.
 marking_wrapper <- function(code) {
   tryCatch(code, gym_error = function(cnd) {
     class(cnd) <- c("gym_error_wrapper", class(cnd))

@@ -45,19 +45,19 @@
 #' )
 #' ```
 #'
-#' @section Options:
-#' `gym.max_answer_bytes`: the largest answer that is accepted from a server, in bytes. The default
-#' is 2^29 (half a gigabyte). The limit for JSON is a sixteenth of this number, because R needs much
-#' more memory for it. A larger answer raises a `gym_error_connection` as soon as the limit is
-#' passed. Compressed answers are not decompressed.
+#' @section Options: `gym.max_answer_bytes`: the size of the largest answer that R accepts from a
+#' server, in bytes. The default is 2^29 (half a gigabyte). The limit for JSON is a sixteenth of
+#' this number, because R needs much more memory for JSON. As soon as an answer passes the limit,
+#' the call raises a `gym_error_connection`. R does not decompress answers.
 #'
-#' `gym.print_seconds`: does [print()] of a result show how long it took and when it began? `FALSE`
-#' leaves these times out, so that a report with fixed seeds is the same each time it is knitted.
+#' `gym.print_seconds`: whether [print()] shows when a result was made and how long that took.
+#' `FALSE` leaves these times out, so that a report with fixed seeds is the same each time you knit
+#' it.
 #'
-#' `gym.viewer` is described at [env_watch()].
+#' `gym.viewer`: how a page opens, see [env_watch()].
 #'
-#' Texts from a server, in errors and names, are shown without control characters and shortened if
-#' they are long.
+#' R shows texts from a server, in errors and names, without control characters, and shortens long
+#' ones.
 #'
 #' @examplesIf gym:::can_start_server()
 #' search <- search_random("CartPole-v0", seed = 1)

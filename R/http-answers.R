@@ -16,8 +16,8 @@ read_answer <- function(response, method, call = rlang::caller_env()) {
   answer
 }
 
-# A response with its `answer` as a list: `NULL` if there is none or it cannot be read; an error of
-# this package then says why.
+# Adds `answer`, a list, to a response: `NULL` if there is no answer, or nobody can read it. Errors
+# of this package say more, so they are raised.
 with_answer <- function(response) {
   read <- function(content, type) {
     if (response$status_code == 204L) {
@@ -39,8 +39,8 @@ with_answer <- function(response) {
   response
 }
 
-# Returns the answer, or NULL if it is no object. `tensors` is the part that only read_tensors() may
-# make.
+# Returns the answer, or NULL if it is not a JSON object. A field `tensors` is removed: only
+# read_tensors() may make it.
 json_answer <- function(content) {
   answer <- from_json(rawToChar(content))
   if (is.list(answer)) {
@@ -113,8 +113,8 @@ refuse_field <- function(value, name, must) {
 
 #' Read the values of an answer
 #'
-#' A wrong answer can cause various errors in R. They become an error that says what was wrong in
-#' the answer.
+#' A wrong answer can cause any error in R. This replaces it by an error that says what is wrong
+#' with the answer.
 #' @noRd
 read_values <- function(expr, what) {
   # This runs in each step: tryCatch() takes three times as long as a calling handler.
@@ -149,7 +149,7 @@ listed_column <- function(listed, name, missing) {
 # Values of spaces ----------------------------------------------------------------
 
 check_numbers <- function(values, shape) {
-  # Only words for NaN and the infinities are read as numbers.
+  # An array with other text than NaN and the infinities is not numeric here.
   if (length(values) != prod(shape) || !is.numeric(values) && !is.logical(values)) {
     abort_answer(paste("A value is not an array of numbers of shape", shape_text(shape)))
   }
@@ -167,7 +167,7 @@ check_list <- function(value, n, what) {
   }
 }
 
-# Its size ----------------------------------------------------------------------------------
+# The size of an answer ---------------------------------------------------------------------
 
 # Limits the size of an answer, so that no server can fill this session's memory.
 
@@ -184,7 +184,7 @@ max_answer_bytes <- function(call = NULL) {
   bytes
 }
 
-# Answers up to this size are always accepted, because reading the option takes time in each call.
+# Answers up to this size are always accepted: to read the option for each call takes time.
 small_answer <- 2^16
 
 # Checks the size of a JSON text before it is parsed.

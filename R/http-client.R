@@ -1,4 +1,4 @@
-# A client: the server's address, its connection, and what the server says about itself.
+# A client: the server's address, the connection, the token, and what the server says about itself.
 
 new_client <- function(remote_base, timeout = 60, config = httr::config(), token = NULL) {
   structure(
@@ -30,9 +30,9 @@ check_client <- function(x, arg = rlang::caller_arg(x), call = rlang::caller_env
   }
 }
 
-# The settings of a client's connection: those made by httr::set_config() for the session, as for
-# httr's own verbs, and then its own. A proxy of the session does not apply to a server on this
-# machine.
+# The settings of a client's connection. The session's settings from httr::set_config() come first,
+# as in httr's own verbs, then the client's own. For a server on this machine, a proxy of the
+# session does not apply.
 client_config <- function(client) {
   session <- getOption("httr_config", httr::config())
   if (is_loopback(client$remote_base)) {
@@ -41,16 +41,16 @@ client_config <- function(client) {
   c(session, client$config)
 }
 
-# httr's timeout() takes precedence over the client's own.
+# httr's timeout() replaces the client's `timeout`.
 timeout_of <- function(client) {
   configured <- client_config(client)$options$timeout_ms
   if (is.null(configured)) client$timeout else configured / 1000
 }
 
-# The part of a client besides its address: what it knows of the server and of its instances, and
-# `home`, its connections. It is made again if the client is in another process or restored from a
-# file: connections are then void, and its idempotency keys belong to the original. `home` is also
-# made again after httr::set_config() or httr::reset_config().
+# The part of a client that changes: what it knows about the server and its instances, and `home`,
+# its connections. A client in another process, or read from a file, gets a new state, because its
+# old connections no longer work and its idempotency keys belong to the original. After
+# httr::set_config() or httr::reset_config(), it gets a new `home`.
 client_state <- function(client) {
   state <- client$state
   moved <- !identical(state$session, the_session) || state$pid != Sys.getpid()
@@ -58,8 +58,8 @@ client_state <- function(client) {
     state$home <- new.env(parent = emptyenv())
     state$session_config <- getOption("httr_config")
     if (moved) {
-      # All clients of one server in one process share their keys: the server remembers a limited
-      # number for an instance, and a script may make a client for each call.
+      # All clients of one server in one process share their keys. The server remembers only a
+      # limited number of keys, and a script may make a client for each call.
       state$keys <- keys_of_place(client$remote_base)
       state$instances <- new.env(parent = emptyenv())
       state$to_close <- character()
@@ -74,9 +74,9 @@ client_state <- function(client) {
   state
 }
 
-# The idempotency keys by which the server recognises a repeated request: a random text, and the
-# number of the last request. All clients and objects of one server, or of one instance, share
-# them, because numbers must grow. A forked process has others.
+# The server recognises a repeated request by its idempotency key: a random text, and a number that
+# grows with each request. So all clients and objects of one server, or of one instance, share the
+# text and the number. A forked process has its own.
 keys_of_place <- function(place) {
   place <- paste(place, Sys.getpid())
   the_session$keys[[place]] %||% (
@@ -84,7 +84,7 @@ keys_of_place <- function(place) {
   )
 }
 
-# The idempotency key of the next request, for its field `request`.
+# The idempotency key of the next request.
 next_key <- function(keys) {
   keys$number <- keys$number + 1
   list(key = keys$key, number = keys$number)
@@ -99,8 +99,8 @@ random_key <- function() {
   ))
 }
 
-# The versions of the server, its Python and its Gymnasium, a named list: requested once. `NULL`
-# without a client, or if there is no answer.
+# The versions of the server, its Python and its Gymnasium, a named list. The client asks only once.
+# `NULL` without a client, or if there is no answer.
 server_versions <- function(client) {
   if (is.null(client)) {
     return(NULL)
@@ -113,8 +113,8 @@ server_versions <- function(client) {
 
 # The token ----------------------------------------------------------------------------------
 
-# The token that a server requires. It is sent in one header and appears nowhere else: it is not
-# printed, and not kept in errors or deparsed code.
+# A server may require a token. R sends it in one header and shows it nowhere else: not in prints,
+# errors or deparsed code.
 
 #' Hide a token from accidental display
 #' @param text The token, a string, or `NULL`.
@@ -147,7 +147,7 @@ as_token <- function(token, call = rlang::caller_env()) {
     return(NULL)
   }
   token <- if (rlang::is_string(token)) trimws(token)
-  # Other characters could end the header or start another one. The error must not have the token.
+  # Other characters could end the header or start another one. The error must not show the token.
   abort_if(
     is.null(token) || !grepl("^[!-~]+$", token), "token", NULL, call,
     "`token` must be one string of visible ASCII characters.",
@@ -160,8 +160,8 @@ as_token <- function(token, call = rlang::caller_env()) {
 # The token in the environment variable.
 variable_token <- function(call = rlang::caller_env()) as_token(Sys.getenv(token_variable), call)
 
-# The token of a server that this session started with these options: the server reads the same
-# file, or the same environment variable.
+# The token of a server that this session starts with these options. The server reads the same file
+# or environment variable.
 server_token <- function(options, call = rlang::caller_env()) {
   if (!is.null(options$token_file)) {
     as_token(paste(readLines(options$token_file, warn = FALSE), collapse = "\n"), call)
@@ -170,12 +170,13 @@ server_token <- function(options, call = rlang::caller_env()) {
   }
 }
 
-# Whether options, or the variable, set a server's token, or that it requires none.
+# Whether the options or the variable say which token a server requires, or that it requires none.
 says_token <- function(options) {
   !is.null(options$token_file) || isTRUE(options$no_auth) || nzchar(Sys.getenv(token_variable))
 }
 
-# The token for an address: that of a server started by this session, otherwise the variable's.
+# The token for an address: that of a server that this session started, otherwise the one in the
+# variable.
 known_token <- function(base, call = rlang::caller_env()) {
   server <- the_session$servers[[base]]
   if (is.null(server)) variable_token(call) else server$token

@@ -1,16 +1,16 @@
-# How a request passes through curl. A line is one of curl's handles, which keeps its connection to
-# the server, with the body that it sends next. A client has one.
+# How a request passes through curl. A line is one of curl's handles, with the body that it sends
+# next. The handle keeps its connection to the server. A client has one line.
 
 json_type <- "application/json"
 tensors_type <- "application/x-safetensors"
 # A message of a stream.
 message_type <- "application/x-gym-message"
-# With transposed tensors, in R's order. A server that does not know it answers by rows.
+# Tensors in R's order, column by column. A server that does not know this type answers row by row.
 column_tensors_type <- "application/x-safetensors; order=column"
 accepted_tensors <- paste0(column_tensors_type, ", ", tensors_type, ";q=0.9")
 
-# The client's line. R may run a finalizer while libcurl calls R, and that may make a request: it
-# gets a line of its own.
+# The client's line. While libcurl calls R, R may run a finalizer, which may make a request. That
+# request gets a line of its own.
 line_of <- function(client) {
   home <- client_state(client)$home
   line <- home$line %||% (home$line <- new_line(client))
@@ -30,13 +30,13 @@ new_line <- function(client) {
     list(
       readfunction = body_reader(line), followlocation = FALSE,
       connecttimeout_ms = min(10, client$timeout) * 1000, timeout_ms = client$timeout * 1000,
-      # Receive the data of thousands of sub-environments in few pieces.
+      # The data of thousands of sub-environments then arrive in few pieces.
       buffersize = 2^18, upload_buffersize = 2^18
     ),
-    # A system-wide proxy would look for the server on its own machine.
+    # A proxy would look for the server on the proxy's own machine.
     if (is_loopback(client$remote_base) && is.null(config$options$proxy)) list(noproxy = "*"),
     config$options,
-    # Compressed answers are not accepted: their size is unknown in advance.
+    # Refuse compressed answers: nobody knows their size in advance.
     list(accept_encoding = NULL, noprogress = FALSE, xferinfofunction = watch_over(client$state))
   ))
   line
@@ -46,7 +46,7 @@ new_line <- function(client) {
 #' @inheritParams send_request
 #' @noRd
 set_line <- function(line, method, body, sends, accepts) {
-  # Each option that is set takes a tenth of the time of a request.
+  # Setting an option takes a tenth of the time of a request, so only set what changes.
   kind <- c(method, sends, accepts)
   if (!identical(kind, line$kind)) {
     headers <- c("Content-Type" = sends, "Accept" = accepts)
@@ -62,8 +62,9 @@ set_line <- function(line, method, body, sends, accepts) {
   line$body <- body
 }
 
-# Makes the function from which curl reads the body. If curl repeats a request itself, it asks for
-# the body a second time, gets nothing and fails: only send_request() may repeat.
+# Makes the function from which curl reads the body. If curl itself repeats a request, it asks for
+# the body a second time, gets nothing and fails. This is intended: only send_request() may repeat a
+# request.
 body_reader <- function(line) {
   function(nbytes, ...) {
     if (line$sent == 0L && length(line$body) <= nbytes) {
@@ -78,13 +79,13 @@ body_reader <- function(line) {
 
 #' Make the function that libcurl calls during a request, about ten times
 #'
-#' It ends the request if there is an interrupt, or if the answer is too large, which
-#' `state$too_large` then says.
+#' It ends the request after an interrupt, or if the answer is too large. In the second case it sets
+#' `state$too_large`.
 #' @noRd
 watch_over <- function(state) {
   received <- -1
   function(down, up) {
-    # An interrupt happens here, if there is one. While more arrives there is another call at once.
+    # Let an interrupt happen here. While more data arrives, skip this: libcurl calls again at once.
     if (down[[2L]] == received) allowInterrupts(Sys.sleep(0)) else received <<- down[[2L]]
     down[[2L]] <= small_answer || {
       # An option that is not a number is reported after the request.
@@ -97,15 +98,15 @@ watch_over <- function(state) {
 
 #' Perform a request
 #'
-#' An interrupt that jumped out of libcurl would make it useless: interrupts happen only in
-#' watch_over(), where R and then libcurl end the request.
+#' An interrupt must not jump out of libcurl, which could not be used afterwards. So interrupts
+#' happen only in watch_over(), which tells libcurl to end the request.
 #' @return The response, or the connection's error.
 #' @noRd
 fetch <- function(line, url, call) {
   line$sent <- 0L
   line$client$state$too_large <- FALSE
-  # The handle's own connection, not one of a pool: on a server for each user, a connection belongs
-  # to one token, and a forked process must not read answers for its parent.
+  # Use the handle's own connection, not one of a pool. With a server for each user, a connection
+  # belongs to one token; and a forked process must not read its parent's answers.
   old <- options(curl_interrupt = FALSE)
   on.exit(options(old))
   suspendInterrupts({
@@ -138,8 +139,8 @@ raise_own_stop <- function(response, client, call) {
   }
 }
 
-# A response as it is, or a connection's error if the connection ended within the header: libcurl
-# takes that for an answer without content.
+# Returns the response, or an error if the connection ended within the header. libcurl takes that
+# for an answer without content.
 whole_response <- function(response) {
   end <- as.raw(c(0x0d, 0x0a, 0x0d, 0x0a))
   cut <- !inherits(response, "error") && !length(response$content) &&

@@ -46,16 +46,17 @@ in_r <- function(hint) {
   if (!is.null(hint)) sub("GET /v1/instances/", "`env_list()`", hint, fixed = TRUE)
 }
 
-# How to install a missing extra. The code that starts a server of this session adds a function for
-# that to the server's entry. Other servers are managed by their operators.
+# How to install a missing extra. The code that starts a server adds a function for this to the
+# server's entry. Other servers have their own operators.
 extra_hint <- function(extra, url) {
   server <- the_session$servers[[base_of(url)]]
   if (!is.null(extra) && !is.null(server$extra_hint)) server$extra_hint(extra)
 }
 
-# The server's messages start in lower case and without a full stop, so that they fit anywhere. Ids
-# and names of arguments keep their case, so only a word of nothing but letters gets a capital. No
-# full stop is added after a quoted command, because people would copy it.
+# The server's messages start in lower case and end without a full stop, so that they fit anywhere.
+# This makes a sentence of a message. Only a first word of plain letters gets a capital, because ids
+# and names of arguments keep their case. A quoted command gets no full stop, because people would
+# copy it.
 sentence <- function(text) {
   if (is.null(text)) {
     return(NULL)
@@ -93,8 +94,8 @@ abort_connection <- function(url, reason, call, reached = TRUE) {
   )
 }
 
-# Whether the server of a connection that broke has ended, if it is one of this session. Its end is
-# seen a moment after the connection's.
+# After a connection broke: whether its server has ended, if this session started it. The process
+# ends a moment after the connection.
 own_server_ended <- function(base) {
   process <- the_session$servers[[base]]$process
   if (is.null(process) || Sys.getpid() != the_session$pid) {
@@ -147,7 +148,7 @@ abort_no_answer <- function(response, call) {
   )
 }
 
-# The name by which a program identifies itself in an answer, curl's or httr's.
+# The name by which a program identifies itself in a response of curl or httr.
 server_name <- function(response) {
   headers <- response$headers
   if (is.raw(headers)) {
@@ -156,7 +157,7 @@ server_name <- function(response) {
   shown_line(headers[["server"]])
 }
 
-# The statuses by which a proxy reports that the server behind it did not answer.
+# A proxy answers with these statuses if the server behind it does not answer.
 proxy_statuses <- 502:504
 
 # The message for a refusal from another program.

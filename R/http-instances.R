@@ -1,8 +1,8 @@
-# The instances that this session has created on servers. An instance is closed when it is no longer
-# used: after garbage collection of its object, if the call that makes it fails after the server's
+# The instances that this session has created on servers. R closes an instance that nobody uses any
+# more: after garbage collection of its object, if the call that makes it fails after the server's
 # answer, and at the end of the session.
 
-# The time for closing in total, in seconds, if nobody waits for it.
+# The most seconds that closing in the background may take, for all instances together.
 closing_time <- 2
 
 # Creates an instance on the server and remembers it. Returns the answer.
@@ -24,7 +24,7 @@ instance_route <- function(instance_id) {
 # The place of an instance in `the_session$instances`.
 instance_place <- function(client, instance_id) paste(client$remote_base, instance_id)
 
-# `server` is the text by which the server says which one it is.
+# `server` is the text by which a server identifies itself. It changes when a server restarts.
 remember_instance <- function(client, instance_id, env_id = NULL, server = NULL) {
   the_session$instances[[instance_place(client, instance_id)]] <- list(
     client = client, pid = Sys.getpid(), instance_id = instance_id, env_id = env_id, server = server
@@ -50,8 +50,8 @@ forget_instances_of <- function(base) {
   rm(list = places_on(base), envir = the_session$instances)
 }
 
-# The environments of this session at an address, or of one server there, for a message; `NULL` if
-# there are none.
+# Text for a message: the environments of this session at an address, or on one server there. `NULL`
+# if there are none.
 environments_on <- function(base, server = NULL) {
   entries <- mget(places_on(base), the_session$instances)
   if (!is.null(server)) {
@@ -61,7 +61,7 @@ environments_on <- function(base, server = NULL) {
   if (length(names)) few_names(unname(names))
 }
 
-# Why a server has ended, if it is one of this session, and what was lost, as bullets of a message.
+# Bullets of a message: why a server of this session has ended, and which environments were lost.
 end_bullets <- function(base) {
   server <- the_session$servers[[base]]
   lost <- environments_on(base)
@@ -71,14 +71,14 @@ end_bullets <- function(base) {
   )
 }
 
-# Raises the error for an instance that ended with its server, if the server at the address does not
-# know it because it was started later, as by the front of `gym_server_start(users = )`.
+# A server that was started again at the same address, for example by the front of
+# `gym_server_start(users = )`, does not know older instances. Raises an error that says so.
 check_not_restarted <- function(url, call) {
   entry <- the_session$instances[[sub("^(.*)/v1/envs/([^/]*)/.*$", "\\1 \\2", url)]]
   if (is.null(entry$server)) {
     return(invisible())
   }
-  # Without an answer the refusal stays as it is.
+  # If the server does not answer now, the first error stays.
   server <- tryCatch(
     get_answer(entry$client, "/v1/health/")$server, gym_error = function(cnd) entry$server
   )
@@ -97,7 +97,7 @@ check_not_restarted <- function(url, call) {
 
 # Closing --------------------------------------------------------------------------
 
-#' Close an instance without references in R
+#' Close an instance that no object in R uses
 #' @noRd
 close_unused <- function(client, instance_id) {
   if (!is.null(instance_id)) {
@@ -106,8 +106,8 @@ close_unused <- function(client, instance_id) {
   }
 }
 
-# Puts an instance on the list of those to close. A finalizer must not do more, because it may run
-# during a request.
+# Puts an instance on the list of instances to close. A finalizer must not do more, because it may
+# run during a request.
 queue_closing <- function(client, instance_id) {
   place <- instance_place(client, instance_id)
   if (exists(place, envir = the_session$instances, inherits = FALSE)) {
@@ -118,8 +118,8 @@ queue_closing <- function(client, instance_id) {
 
 #' Close the instances on the list
 #'
-#' Those that cannot be closed in time are tried again only at the end of the session, so that a
-#' server that hangs delays one call only.
+#' If an instance cannot be closed in time, R tries again only at the end of the session. So a
+#' server that hangs delays only one call.
 #' @noRd
 close_queued <- function(client) {
   state <- client_state(client)
@@ -130,7 +130,7 @@ close_queued <- function(client) {
   }
 }
 
-# At the end of the session. Instances on the session's own servers end with these.
+# For the end of the session. Instances on the session's own servers end with these servers.
 close_session_instances <- function(seconds) {
   places <- ls(the_session$instances, all.names = TRUE, sorted = FALSE)
   is_elsewhere <- function(place) {
@@ -141,9 +141,9 @@ close_session_instances <- function(seconds) {
 
 #' Close several instances in a limited time
 #'
-#' This does not use a client's connection, which may be in use. It repeats nothing, and closes all
-#' instances at the same time, because each may hang. A forked child does not close instances of its
-#' parent.
+#' This does not use a client's line, which may be busy. It repeats nothing, and closes all
+#' instances at the same time, because each call may hang. A forked child does not close its
+#' parent's instances.
 #' @param places Their places in `the_session$instances`.
 #' @noRd
 close_together <- function(places, seconds) {

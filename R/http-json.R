@@ -1,5 +1,5 @@
-# JSON for requests: doubles keep 17 significant digits (jsonlite writes 15), and numbers without a
-# JSON form are sent as "NaN", "Infinity", "-Infinity".
+# JSON for requests. Doubles keep 17 significant digits (jsonlite writes 15). Numbers that JSON does
+# not have become "NaN", "Infinity" and "-Infinity".
 
 json_number <- function(x) {
   if (is.integer(x)) {
@@ -8,7 +8,7 @@ json_number <- function(x) {
     text <- ifelse(x, "true", "false")
   } else {
     text <- with_decimal_point(sprintf("%.17g", x))
-    # Most readers take "-0" for an integer without a sign.
+    # Most parsers read "-0" as the integer 0.
     text[text == "-0"] <- "-0.0"
   }
   odd <- !is.finite(x)
@@ -63,8 +63,8 @@ json_nested <- function(elements, shape) {
 
 #' Write an R value as JSON
 #'
-#' A named list becomes an object, an unnamed list an array, a vector of length one a scalar unless
-#' it is wrapped in `I()`. An array is nested row by row.
+#' A named list becomes an object, an unnamed list an array. A vector of length one becomes a single
+#' value, unless it is wrapped in `I()`. An array becomes nested arrays, row by row.
 #' @noRd
 to_json <- function(x) {
   if (is.null(x)) {
@@ -114,13 +114,14 @@ from_json <- function(text) {
   with_decimal_point(jsonlite::parse_json(text, bigint_as_char = TRUE))
 }
 
-# Our server nests spaces up to 100 levels deep, with three brackets per level. The parser would
-# overflow the stack at some ten thousand levels, and the code that reads the values earlier.
+# Our server nests spaces up to 100 levels deep, with three brackets per level. Deeper JSON could
+# overflow the stack: of the code that reads the values first, and of the parser at about ten
+# thousand levels.
 deepest_json <- 320L
 
-# Each level opens and closes a bracket, so a shorter text need not be checked.
+# Only a text that is longer than this number of opening and closing brackets can be too deep.
 check_json_depth <- function(text) {
-  # Brackets in texts do not nest.
+  # Remove strings: their brackets do not count.
   text <- gsub("\"(?:[^\"\\\\]++|\\\\.)*+\"", "", text, perl = TRUE, useBytes = TRUE)
   bytes <- as.integer(charToRaw(text))
   depth <- cumsum(bytes %in% utf8ToInt("[{")) - cumsum(bytes %in% utf8ToInt("]}"))
@@ -131,7 +132,7 @@ check_json_depth <- function(text) {
 
 # Refuses the escaped character NUL, but not an escaped backslash before "u0000".
 refuse_nul <- function(text) {
-  # By bytes, because the text may not be UTF-8; the parser refuses that later.
+  # Search the bytes, because the text may not be UTF-8. The parser refuses such a text later.
   if (grepl("(?<!\\\\)(\\\\\\\\)*\\\\u0000", text, perl = TRUE, useBytes = TRUE)) {
     gym_abort(
       "A text from the server has the character NUL, which R strings cannot contain.",
@@ -141,8 +142,8 @@ refuse_nul <- function(text) {
   }
 }
 
-# Returns JSON numbers, nested or not, as a numeric vector. Some may be the words for NaN and the
-# infinities.
+# Returns JSON numbers, nested or not, as a numeric vector. Some may be text: "NaN", "Infinity" or
+# "-Infinity".
 numbers_from_json <- function(elements) {
   numbers <- unlist(elements, use.names = FALSE)
   if (is.character(numbers)) {
@@ -196,7 +197,7 @@ info_from_json <- function(x, depth = 0L) {
   } else if (!is.null(names(x))) {
     lapply(x, info_from_json, depth + 1L)
   } else if (any(vapply(x, is.list, NA))) {
-    # Evaluate this before the call, or it would be on the stack at each level.
+    # Evaluate this first: as a promise, it would make the stack deeper at each level.
     rows <- lapply(x, info_from_json, depth + 1L)
     stack_rows(rows, x)
   } else {
@@ -204,14 +205,14 @@ info_from_json <- function(x, depth = 0L) {
   }
 }
 
-# Our server nests it up to 128 levels deep.
+# Our server nests infos up to 128 levels deep.
 deepest_info <- 160L
 
 is_number_word <- function(x) is.character(x) && x %in% c("NaN", "Infinity", "-Infinity")
 
 info_vector <- function(x) {
   all_are <- function(is_kind) all(vapply(x, is_kind, NA))
-  # "NaN" and the like are numbers, unless other text is beside them.
+  # "NaN" and the infinities are numbers, unless there is other text beside them.
   if (all_are(function(one) is.numeric(one) || is_number_word(one))) {
     numbers_from_json(x)
   } else if (all_are(is.logical) || all_are(is.character)) {

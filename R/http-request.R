@@ -5,15 +5,15 @@
 #' @param route The path, after the client's address.
 #' @param body A raw vector, for a POST.
 #' @param sends,accepts The types of the body and of the answer.
-#' @param repeatable Whether it may be sent again if its connection broke: the server recognises it
-#'   by its idempotency key, or to do it twice changes nothing.
+#' @param repeatable Whether it may be sent again after the connection broke. It may if the server
+#'   recognises it by its idempotency key, or if doing it twice changes nothing.
 #' @return As [curl::curl_fetch_memory()], for any status.
 #' @noRd
 send_request <- function(client, route, method = "POST", body = raw(), sends = json_type,
                          accepts = json_type, repeatable = method == "GET",
                          call = rlang::caller_env()) {
-  # The body may hold the answer to another request, as in env_step(x, id,
-  # env_action_space_sample(x, id)). Make that one first.
+  # The body may be computed by another request, as in env_step(x, id, env_action_space_sample(x,
+  # id)). Do that request first.
   force(body)
   line <- line_of(client)
   line$busy <- TRUE
@@ -44,7 +44,7 @@ send_request <- function(client, route, method = "POST", body = raw(), sends = j
   }
 }
 
-# Sends a POST and reads its answer. With an idempotency key the server does it once.
+# Sends a POST and reads its answer. With an idempotency key, the server does it only once.
 post_answer <- function(client, route, fields = NULL, key = NULL, repeatable = !is.null(key),
                         call = rlang::caller_env()) {
   response <- send_request(
@@ -63,8 +63,8 @@ get_answer <- function(client, route, takes_tensors = FALSE, call = rlang::calle
 #' Write a body in JSON
 #' @param fields JSON texts, named.
 #' @param key The idempotency key, a list as [next_key()] returns it.
-#' @return A raw vector. It has blanks at its end, so that most bodies of one route have one length:
-#'   curl takes as long to set the length as for half a request.
+#' @return A raw vector. Blanks at its end give most bodies of a route the same length, because
+#'   setting the length in curl takes half as long as a request.
 #' @noRd
 json_body <- function(fields, key = NULL) {
   request <- if (!is.null(key)) sprintf('{"key":"%s","number":%.0f}', key$key, key$number)
@@ -78,7 +78,8 @@ max_attempts <- 4L
 
 #' Decide whether and when to send a request again
 #'
-#' A busy server says when to ask again, but a single request does not wait for that.
+#' A busy server (status 429) says when to ask again. Only requests of [perform_several()] wait for
+#' that.
 #' @param outcome The connection's error, or the response.
 #' @param attempt The number of attempts made.
 #' @return The seconds to wait, `NULL` to give up.
@@ -95,7 +96,8 @@ pause_before_next <- function(outcome, attempt) {
   }
 }
 
-# libcurl's messages for a lost connection, as opposed to one that could not be made or a timeout.
+# Whether libcurl's message says that a connection broke. A connection that could not be made, or a
+# timeout, is something else.
 connection_broke <- function(reason) {
   grepl(
     paste(
@@ -108,9 +110,9 @@ connection_broke <- function(reason) {
   )
 }
 
-# Whether the user was asked and a server was started, at the first request of a client if nothing
-# listens at its address. Only clients of create_GymClient() ask. The function that asks belongs to
-# an upper layer and is registered by .onLoad().
+# If nothing listens at a client's address at its first request, asks the user whether to start a
+# server there. Returns whether one was started. Only clients of create_GymClient() ask. The
+# function that asks is in an upper layer; .onLoad() registers it.
 prompted_server_starts <- function(client, reached, call) {
   state <- client$state
   prompts <- !reached && isTRUE(state$may_prompt)
@@ -122,21 +124,21 @@ prompted_server_starts <- function(client, reached, call) {
 
 #' Send a POST several times, some at the same time
 #'
-#' While the server works on one, R reads the answer to another. When the call ends, also by an
-#' interrupt or an error, the open connections are dropped. This tells the server that nobody wants
-#' their answers.
+#' While the server works on one request, R reads the answer to another. At the end, also after an
+#' interrupt or an error, this closes connections with open requests, which tells the server that
+#' nobody wants the answers.
 #'
 #' @param next_content A function that returns the next message, a list with its `body`; `NULL` if
 #'   there is nothing to send now.
 #' @param received A function of the message, its response and the seconds that it took. It is
-#'   called once for each, in the order of the answers, and returns whether to end.
+#'   called once for each response, in the order in which they arrive, and returns whether to stop.
 #' @param sends The type of the bodies.
 #' @param at_once The largest number of open requests.
 #' @noRd
 perform_several <- function(client, route, next_content, received, sends = tensors_type,
                             at_once = 2L, call = rlang::caller_env()) {
   home <- client_state(client)$home
-  # It keeps its connections from call to call.
+  # The pool keeps its connections from call to call.
   home$pool <- home$pool %||% curl::new_pool()
   several <- rlang::env(
     client = client, url = paste0(client$remote_base, route), sends = sends, call = call,
@@ -181,8 +183,8 @@ send_one <- function(one, several) {
   })
 }
 
-# Lets curl do what it can do at once and then waits for more. curl would wait for whole seconds,
-# using a core that the server needs.
+# Lets curl do what it can do at once, and then waits for more data without it. While curl waits, it
+# uses a core that the server needs.
 await_outcomes <- function(several) {
   client <- several$client
   client$state$too_large <- FALSE
@@ -198,7 +200,7 @@ await_outcomes <- function(several) {
     # At most a tenth of a second.
     processx::poll(list(processx::curl_fds(files)), 100)
   } else {
-    # While curl connects, or all requests wait to be sent again.
+    # curl is still connecting, or all requests wait to be sent again.
     Sys.sleep(0.002)
   }
   # A request may take long, but a working server answers another one.

@@ -1,17 +1,18 @@
-# Streams: WebSockets for the steps and resets of one instance, on sockets of base R. The work that
-# curl and HTTP do for a request takes several times as long as a step. Where there can be no stream
-# the same messages go by HTTP. inst/server/PROTOCOL.md describes them.
+# Streams: WebSockets for the steps and resets of one instance, on sockets of base R. A request by
+# curl and HTTP takes several times as long as a step itself. If there can be no stream, the same
+# messages go by HTTP. inst/server/PROTOCOL.md describes them.
 
 # R allows about 128 open connections in a session.
 most_streams <- 32L
 
-# A stream that was used within so many messages of the session is not closed to open another one.
+# A stream stays open if it was used in this number of last messages of the session; only other
+# streams are closed to make room.
 recent_messages <- 1000
 
-#' Find the stream of an instance, and open it if it can be
+#' Find the stream of an instance, and try to open it
 #'
-#' A stream is void in another process, after the end of the session in which it was made, and after
-#' a change of httr's settings, like the client's other connections.
+#' A stream is replaced in another process, in a later session, and after a change of httr's
+#' settings, like the client's other connections.
 #' @return An environment with the instance's idempotency `keys`. Its `con` is `NULL` if the next
 #'   message must go by HTTP.
 #' @noRd
@@ -42,7 +43,7 @@ new_stream <- function(instance, state) {
   stream$busy <- FALSE
   stream$failures <- 0L
   stream$used <- 0
-  # Why messages go by HTTP for good, in words.
+  # Why messages always go by HTTP, as text.
   stream$why_http <- why_http(instance$client)
   stream
 }
@@ -82,7 +83,7 @@ open_stream <- function(stream) {
     return(FALSE)
   }
   stream$failures <- stream$failures + 1L
-  # An interrupt closes the socket, too.
+  # Close the socket also after an interrupt.
   con <- NULL
   on.exit(if (is.null(stream$con) && !is.null(con)) close(con))
   failed <- tryCatch(
@@ -96,7 +97,7 @@ open_stream <- function(stream) {
     error = function(cnd) TRUE
   )
   if (failed) {
-    # The error, if there is one, comes from the request by HTTP.
+    # The request by HTTP will report the error, if there is one.
     if (stream$failures > 1L) stream$why_http <- stream$why_http %||% "no stream could be opened"
     return(FALSE)
   }
@@ -120,8 +121,8 @@ drop_streams <- function(is_meant) {
   for (stream in Filter(is_meant, open_streams())) drop_stream(stream)
 }
 
-# Closes the stream that was used least recently if there are too many. Returns whether there is
-# room: streams that are in use stay.
+# If there are too many streams, closes the one that was used least recently, unless it is still in
+# use. Returns whether there is room for another.
 make_room_for_stream <- function() {
   streams <- open_streams()
   if (length(streams) < most_streams) {
@@ -157,7 +158,7 @@ connect_stream <- function(stream) {
 
 address_pattern <- "^http://(\\[[^]]*\\]|[^/:]+)(:[0-9]+)?(.*)$"
 
-# Reads the head of the answer. A server without streams is remembered.
+# Reads the head of the answer. If a proxy lets no stream pass, this is remembered.
 is_upgraded <- function(stream, con) {
   status <- readLines(con, 1L)
   if (grepl("^HTTP/1.1 101 ", status)) {
@@ -178,7 +179,7 @@ message_layout <- function(stream, call) {
   )
 }
 
-# Each layout as the entries of read_layout(); `NULL` for what has no fixed layout.
+# Each layout as a list of entries, see read_layout(); `NULL` if values have no fixed layout.
 read_layouts <- function(tables) {
   layout_of <- function(table) {
     if (!is.null(table)) Map(c, lapply(table, read_entry, TRUE), lapply(table, `[`, "dtype"))
@@ -186,7 +187,8 @@ read_layouts <- function(tables) {
   lapply(tables[c("action", "step", "reset")], layout_of)
 }
 
-# Closes a stream's socket, unless somebody else has closed it and its number is another's by now.
+# Closes a stream's socket, unless somebody else has closed it: another connection may have its
+# number by now.
 drop_stream <- function(stream) {
   con <- stream$con
   stream$con <- NULL
@@ -203,11 +205,11 @@ is_same_connection <- function(con) {
 #' Send a message by a stream and wait for its answer
 #'
 #' @param stream From [stream_of()], with a connection.
-#' @param message What is known of it and its answers, see [step_message()].
+#' @param message How to write it and read its answers, see [step_message()].
 #' @param content Its content after the number, a raw vector.
 #' @param head The frame's and the message's head.
-#' @return A list of one element: the result. If the stream broke, and the same must be asked by
-#'   HTTP, its number.
+#' @return A list of one element, the result. If the stream broke, the number of the message, which
+#'   must then be sent by HTTP.
 #' @noRd
 ask_stream <- function(stream, message, content, head, call) {
   keys <- stream$keys
@@ -215,13 +217,13 @@ ask_stream <- function(stream, message, content, head, call) {
   sent <- c(head, writeBin(number, raw(), endian = "little"), content)
   stream$used <- the_session$messages <- the_session$messages + 1
   stream$busy <- TRUE
-  # Such as after an interrupt: what comes then is the answer to another message.
+  # After an interrupt, the next data would be the answer to this message: drop the stream.
   on.exit(if (stream$busy) drop_stream(stream))
   answer <- exchange(stream$con, sent, message$count)
-  # The usual answer: arrays, nothing after them.
+  # The usual answer has arrays and nothing after them.
   is_usual <- !is.null(message$usual) && length(answer) == message$count &&
     answer[[1L]] == message$usual && answer[[2L]] == 0 && answer[[3L]] == number
-  # NA: such as a ping of another server with bytes that are no numbers.
+  # NA is possible: another frame, such as a ping, may have bytes that are not numbers.
   if (isTRUE(is_usual)) {
     stream$busy <- FALSE
     return(list(message$read(answer)))
@@ -240,9 +242,9 @@ ask_stream <- function(stream, message, content, head, call) {
   number
 }
 
-# Sends a message and reads so many numbers of the answer, or with `NULL` none. NULL if the
-# connection broke: a default is evaluated in its function, so a handler that reads `broke` returns
-# from here. tryCatch() would take three times as long.
+# Sends a message and reads `count` numbers of the answer, or none if `count` is NULL. Returns NULL
+# if the connection broke: R evaluates a default in its own function, so a handler that reads
+# `broke` returns from exchange(). tryCatch() would take three times as long.
 exchange <- function(con, sent, count, broke = return(NULL)) {
   withCallingHandlers(
     {
@@ -257,7 +259,7 @@ exchange <- function(con, sent, count, broke = return(NULL)) {
 
 #' Read the rest of an answer
 #'
-#' @param begun Its first bytes, as numbers; `NULL` if the connection broke.
+#' @param begun The first bytes of the answer, as numbers; `NULL` if the connection broke.
 #' @param count How many numbers were asked for.
 #' @return The content of the message; `NULL` if the stream has ended.
 #' @noRd
@@ -287,7 +289,7 @@ finish_answer <- function(stream, begun, count, call) {
   answer$content
 }
 
-# The code of a closing frame, 4001.
+# 4001, the code of a closing frame if another client takes the stream over.
 taken_over <- as.raw(c(4001 %/% 256, 4001 %% 256))
 
 #' Read a message of the server
@@ -311,14 +313,14 @@ read_message <- function(con, begun = raw()) {
   if (size > max_answer_bytes()) abort_too_large()
   read <- begun[-seq_len(at)]
   rest <- take(size - length(read))
-  # Joining pictures would take as long as reading them.
+  # Avoid c(), which would take as long for a picture as reading it.
   list(first = begun[[1L]], content = if (length(read)) c(read, rest) else rest)
 }
 
 # The bytes of an answer before its arrays.
 message_head_size <- 20L
 
-# Reads an answer that is not as usual: with infos, an error, or with other arrays.
+# Reads an answer that is not the usual one: with infos, with other arrays, or with an error.
 read_stream_answer <- function(stream, message, content, call) {
   if (length(content) < message_head_size) {
     abort_answer("It is shorter than the head of a message", call)
@@ -340,12 +342,13 @@ read_stream_answer <- function(stream, message, content, call) {
 
 #' Send a message by HTTP and wait for its answer
 #' @inheritParams ask_stream
-#' @param number Its number, if a stream broke after it was sent.
+#' @param number The message's number, if a stream broke after the message was sent; otherwise
+#'   `NULL`.
 #' @noRd
 post_message <- function(stream, message, content, head, number, call) {
   keys <- stream$keys
   number <- number %||% (keys$number <- keys$number + 1)
-  # Without the head of a frame.
+  # By HTTP, there is no head of a WebSocket frame: only the last 8 bytes are of the message.
   head <- head[length(head) - 7:0]
   body <- c(head, writeBin(number, raw(), endian = "little"), content)
   response <- send_request(
@@ -371,6 +374,6 @@ message_head <- function(size, what, form, flags = 0L) {
   } else {
     as.raw(c(0x82, 0xff, floor(total / 256^(7:0)) %% 256))
   }
-  # The key that masks the content is zero.
+  # The content is masked with zero, which changes nothing.
   c(head, raw(4L), as.raw(c(what, form, flags)), raw(5L))
 }

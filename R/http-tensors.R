@@ -17,7 +17,7 @@ read_tensors <- function(bytes, by_column = FALSE) {
   list(tensors = read_entries(bytes, layout), metadata = layout$metadata)
 }
 
-# The most tensors, which take some seconds to read.
+# The most tensors of a file. Reading so many takes some seconds.
 most_tensors <- 2^14
 
 #' Read the header of a file
@@ -38,7 +38,7 @@ read_layout <- function(bytes, by_column) {
   }
   entries <- lapply(entries, read_entry, by_column)
   entries <- entries[order(vapply(entries, function(entry) entry$begin, 0))]
-  # With as many bytes as the file, tensors take no more memory than it.
+  # The tensors must have as many bytes as the file: so they cannot take more memory than it.
   size <- sum(vapply(entries, function(entry) as.double(entry$size), 0))
   if (size != length(bytes) - data) {
     abort_answer(paste("The tensors have", count_of(size, "byte"), "and the file",
@@ -66,8 +66,8 @@ read_entry <- function(entry, by_column) {
   entry
 }
 
-# Up to this size tensors are read by an index, from a larger file by a connection of R, which
-# copies the file once and is then much faster per byte.
+# Tensors of a file up to this size are read by an index. For a larger file, a raw connection is
+# faster, although it copies the file once.
 index_up_to <- 8192L
 
 read_entries <- function(bytes, layout) {
@@ -101,7 +101,7 @@ read_entries <- function(bytes, layout) {
   entries
 }
 
-# Bytes become integers after reordering.
+# Reorders bytes before they become integers: they are a fourth of the size.
 place_by_row <- function(values, shape) {
   values <- shape_values(values, shape)
   if (is.raw(values)) array(as.integer(values), shape) else values
@@ -115,10 +115,10 @@ read_numbers <- function(what, size, signed = TRUE) {
   function(bytes, n) readBin(bytes, what, n, size = size, signed = signed, endian = "little")
 }
 
-# Bytes stay bytes until they are reordered: they are a fourth of the size of integers.
+# place_by_row() converts bytes to integers later.
 read_byte <- function(bytes, n) bytes
 
-# The bits of the smallest int32 are R's NA.
+# R reads the smallest int32 as NA.
 read_int32 <- function(bytes, n) {
   values <- readBin(bytes, "integer", n, size = 4L, endian = "little")
   if (anyNA(values)) signed_half(values) else values
@@ -155,7 +155,7 @@ write_int64 <- function(x) bytes_of_whole(x)
 
 tensor_type <- function(size, read, write) list(size = size, read = read, write = write)
 
-# By the name in a header: the bytes of a number, and the functions that read and write it.
+# For each dtype in a header: the bytes of a number, and the functions that read and write numbers.
 tensor_types <- list(
   F64 = tensor_type(8L, read_numbers("double", 8L), write_numbers(as.double, 8L)),
   F32 = tensor_type(4L, read_numbers("double", 4L), write_numbers(as.double, 4L)),
@@ -215,7 +215,7 @@ write_tensors <- function(tensors, metadata) {
       ends[[i]] - sizes[[i]], ends[[i]]
     )
   }, "")
-  # In a JSON text no other characters need escaping.
+  # The values are JSON texts: only their quotes and backslashes need escaping.
   metadata[] <- paste0("\"", gsub("([\"\\\\])", "\\\\\\1", enc2utf8(metadata)), "\"")
   header <- paste0(c("{\"__metadata__\":", json_object(metadata), table, "}"), collapse = "")
   header <- charToRaw(header)

@@ -33,13 +33,13 @@ system_name <- function() {
   paste0(tolower(info[["sysname"]]), "-", machine)
 }
 
-# The lock files are written by tools/lock: base.txt has the server's own packages, EXTRA.txt those
-# of an extra.
+# tools/lock writes the lock files: base.txt has the server's own packages, EXTRA.txt those of an
+# extra.
 lock_files <- function(extras) {
   system.file("server", "lock", paste0(c("base", extras), ".txt"), package = "gym")
 }
 
-# Identifies the lock files. Line endings are ignored, because git and zip programs may change them.
+# Identifies the lock files. It ignores line endings, because git and zip programs may change them.
 lock_hash <- function() {
   lines <- unlist(lapply(lock_files(server_extras), readLines, warn = FALSE))
   substr(hex(openssl::sha256(charToRaw(paste(lines, collapse = "\n")))), 1L, 12L)
@@ -65,8 +65,8 @@ environment_python <- function(folder) {
 }
 
 #' Find the installed environment
-#' @return `NULL`, or a list: `python`, the path of its Python; `folder`; `extras`, those that are
-#'   installed.
+#' @return `NULL`, or a list: `python`, the path of its Python; `folder`; `extras`, the installed
+#'   extras.
 #' @noRd
 installed_server <- function() {
   folder <- environment_folder()
@@ -95,17 +95,18 @@ is_installed_python <- function(python) {
   !is.null(python) && startsWith(python, paste0(install_root(), "/"))
 }
 
-# Called before a server starts, so that its environment is not removed as unused.
+# Notes that an environment is in use, so that nobody removes it as an old one. Call it before a
+# server starts.
 use_python <- function(python) {
   if (is_installed_python(python)) {
     manifest <- file.path(dirname(dirname(dirname(python))), "installed")
-    # Changing the time fails in another user's environment.
+    # Only the owner of an environment can change the time.
     suppressWarnings(Sys.setFileTime(manifest, Sys.time()))
   }
 }
 
-# Servers of other sessions, also on other machines with the same home, may run from another
-# version's environment.
+# Removes environments of other versions that nobody has used for 30 days. Others may be in use by
+# servers of other sessions, also on other machines with the same home directory.
 remove_old_folders <- function() {
   manifests <- Sys.glob(file.path(install_root(), "*", "installed"))
   old <- difftime(Sys.time(), file.mtime(manifests), units = "days") > 30

@@ -1,4 +1,4 @@
-# Find uv, <https://docs.astral.sh/uv/>, or fetch it; and run it.
+# Finds uv (<https://docs.astral.sh/uv/>) or downloads it, and runs it.
 
 uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 
@@ -6,7 +6,7 @@ uv_name <- function() if (is_windows()) "uv.exe" else "uv"
 least_uv <- "0.7.0"
 
 #' Find uv
-#' @return The path of the first one that runs and is new enough, or `NULL`.
+#' @return The path of the first uv that runs and is new enough, or `NULL`.
 #' @noRd
 find_uv <- function(call = rlang::caller_env(), timeout = 30) {
   named <- Sys.getenv("GYM_UV")
@@ -43,8 +43,8 @@ uv_works <- function(uv, timeout = 30) {
   startsWith(output, "uv ") && length(version) == 1L && package_version(version) >= least_uv
 }
 
-# The release to download if there is no uv, and the SHA-256 of its archives, as published with it.
-# Their source is src/download/checksum/known-checksums.json in github.com/astral-sh/setup-uv.
+# The release to download if there is no uv, and the SHA-256 of its archives, which uv publishes.
+# They come from src/download/checksum/known-checksums.json in github.com/astral-sh/setup-uv.
 uv_release <- list(
   version = "0.12.16",
   checksums = c(
@@ -111,7 +111,7 @@ fetch_uv <- function(call) {
   url <- paste0(sub("/+$", "", base), "/", basename(archive))
   cli::cli_inform(c(i = "Downloading uv {uv_release$version} (about 20 MB)."))
   handle <- curl::new_handle()
-  # A download ends if it stays below this many bytes per second for so many seconds.
+  # Give up a download that stays below this many bytes per second for so many seconds.
   curl::handle_setopt(handle, low_speed_limit = 100, low_speed_time = 60)
   certificates <- Sys.getenv("SSL_CERT_FILE")
   if (nzchar(certificates)) curl::handle_setopt(handle, cainfo = certificates)
@@ -169,13 +169,13 @@ unpack_uv <- function(archive) {
 #' @noRd
 run_uv <- function(uv, arguments) {
   pythons <- Sys.getenv("UV_PYTHON_INSTALL_DIR")
-  # Not the working directory, where a project may have settings for uv.
+  # Do not run uv in the working directory, where a project may have settings for uv.
   run <- run_quietly(uv, c("--directory", install_root(), arguments), timeout = Inf, env = c(
     "current",
     PYTHONPATH = "", PYTHONHOME = "", VIRTUAL_ENV = "", UV_NO_PROGRESS = "1", NO_COLOR = "1",
     own_library_path(),
-    # uv's Pythons are beside the environments, so that they are removed together, and on Windows
-    # outside the roaming profile. No command is added to the PATH, no entry to the registry.
+    # Keep uv's Pythons beside the environments, so that users can delete all together; on Windows,
+    # this is outside the roaming profile. Add no command to the PATH and no entry to the registry.
     UV_PYTHON_INSTALL_DIR = if (nzchar(pythons)) pythons else file.path(install_root(), "python"),
     UV_PYTHON_INSTALL_BIN = "0", UV_PYTHON_INSTALL_REGISTRY = "0"
   ))
@@ -183,7 +183,7 @@ run_uv <- function(uv, arguments) {
        text = without_passwords(paste0(run$stdout, run$stderr)))
 }
 
-# Raises an error with the lines of uv's message, or its last lines, and advice.
+# Raises an error with uv's error message, or the last lines of its output, and with advice.
 abort_uv <- function(what, output, call, more = NULL) {
   lines <- trimws(strsplit(output$text, "\r?\n")[[1L]])
   lines <- lines[nzchar(lines)]
@@ -203,7 +203,7 @@ abort_uv <- function(what, output, call, more = NULL) {
   )
 }
 
-# Advice on the output of uv, curl or the system: that of the first entry whose words are in it.
+# Finds advice for an output of uv, curl or the system: the first entry whose pattern matches.
 install_advice <- function(text) {
   advice <- Find(function(entry) grepl(entry[[1L]], text, ignore.case = TRUE), install_advices)
   if (!is.null(advice)) c(i = advice[[2L]])

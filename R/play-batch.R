@@ -2,16 +2,16 @@
 # depends only on the environment, the policy, the seeds and the random stream. So a lost batch can
 # be played again, in any order and on any worker.
 #
-# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch; this is fixed
-# before the first step. If the next episode went to whichever sub-environment ends first and
-# playing stopped at a number of episodes, short episodes would be favoured.
+# Sub-environment i of n plays the episodes i, i + n, i + 2n and so on of its batch. This is fixed
+# before the first step. Otherwise, if the sub-environment that ends first got the next episode, and
+# playing stopped after a number of episodes, the result would have too many short episodes.
 
 #' Play a batch of episodes
 #'
-#' Draws from the batch's own stream; the session's generator is left as it was. An error or an
-#' interrupt ends it without a result.
+#' Random numbers come from the batch's own stream; the session's generator does not change. An
+#' error or an interrupt ends the batch without a result.
 #' @param vector_env As returned by [as_vector_env()].
-#' @param policy The policy, bound to the environment: one, or the candidates that play the batch.
+#' @param policy The policy, bound to the environment, or the candidates that play the batch.
 #' @param episodes A list of vectors with an element for each episode: `candidate` (the number of
 #'   the candidate that plays it), `episode` (its number among the candidate's episodes) and `seed`.
 #' @param stream The stream that the policy draws from.
@@ -21,19 +21,20 @@
 #' @param each The number of episodes of a candidate.
 #' @param keep_moments Whether to keep the moments of the observations before each action.
 #' @param keep_steps,keep_next Whether to keep each step, and the observation after it.
-#' @param learner `NULL`, or a list of two functions that replace the policy: `act` of the
-#'   observations and the numbers of their sub-environments, and `observe` of the results of each
-#'   step, see [agent_observe()].
+#' @param learner `NULL`, or a list of two functions that replace the policy: `act`, a function of
+#'   the observations and the numbers of their sub-environments, and `observe`, a function of the
+#'   results of each step, see [agent_observe()].
 #' @param report A function that is called with the number of finished episodes.
 #' @return A list of vectors with an element for each episode: those of `episodes`, `sub_env`,
 #'   `return`, `length`, `terminated`, `truncated`; and the lists `steps`, `frames` and `moments`
-#'   (of one, those of all). Candidates after one that has reached the target are left out.
+#'   (one element, for all episodes together). Candidates after the first one that reached the
+#'   target are left out.
 #' @noRd
 play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, target = NULL,
                        each = 1L, keep_steps = FALSE, keep_next = FALSE, keep_moments = FALSE,
                        learner = NULL, report = function(ended) NULL) {
-  # Let R itself multiply matrices: a row of the product then does not depend on the other rows, to
-  # the last bit. This does not hold for every library of linear algebra.
+  # Let R itself multiply matrices. Then a row of the product does not depend on the other rows, to
+  # the last bit. Some libraries of linear algebra do not guarantee this.
   matprod <- options(matprod = "internal")
   on.exit(options(matprod))
   n <- length(episodes$episode)
@@ -44,7 +45,8 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
     seed = episodes$seed, sub_env = (seq_len(n) - 1L) %% at_once + 1L,
     return = numeric(n), length = integer(n),
     terminated = logical(n), truncated = logical(n), ended = logical(n), needed = n,
-    # Which observations count must not depend on when other episodes end.
+    # Moments count the observations of all episodes: with a target, they would depend on which
+    # episodes end first.
     target = if (!keep_moments) target, each = each,
     steps = list(), frames = list(), report = report,
     vector_env = vector_env, policy = with_memory(policy, at_once), max_steps = max_steps,
@@ -69,7 +71,7 @@ play_batch <- function(vector_env, policy, episodes, stream, max_steps = Inf, ta
   c(episodes, kept)
 }
 
-# An error names the user's call instead of a step that the user did not take.
+# Makes errors name the user's call, because the user did not take the step that failed.
 naming_call <- function(code, vector_env) {
   withCallingHandlers(
     code,
@@ -77,7 +79,7 @@ naming_call <- function(code, vector_env) {
       if (!inherits(cnd, "gym_error") && is_about_one(cnd)) abort_about_one(cnd, vector_env)
     },
     gym_error = function(cnd) {
-      # Was it raised by a reset or a step of this package, not by one that a user wrote?
+      # Did a reset or a step of this package raise it, and not one that a user wrote?
       steps <- list(quote(step), quote(env$step), quote(env$reset))
       own <- is.null(cnd$call) || any(vapply(steps, identical, NA, cnd$call[[1L]]))
       if (!own) return()
@@ -93,9 +95,10 @@ naming_call <- function(code, vector_env) {
 }
 
 # Plays the episodes from `first` to `last` of a batch. `playing` is the state that changes with
-# each step: `rows` has an element for each running sub-environment (the episode of the batch, its
-# number, the return so far, and the number of steps before the episode began), `observation` a row.
-# `acting` is the policy for these rows, whose candidates are `candidate`.
+# each step. Its vectors in `rows` have an element for each running sub-environment: its episode in
+# the batch, its number, the return so far, and the number of steps before the episode began.
+# `observation` has a row for each of them, `candidate` the candidate, and `acting` is the policy
+# for these rows.
 play_episodes <- function(batch, first, last) {
   vector_env <- batch$vector_env
   episode <- seq.int(first, min(last, batch$needed, first + batch$at_once - 1L))
@@ -146,8 +149,8 @@ end_step <- function(batch, playing, action, out) {
   if (!is.null(batch$moments)) {
     values <- number_rows(playing$observation)
     batch$noted[[length(batch$noted) + 1L]] <- values
-    # R takes as long to add a few rows to the moments as hundreds, so several steps are added
-    # together. How many depends only on an observation's size.
+    # Adding a few rows to the moments takes R as long as adding hundreds. So this adds several
+    # steps together. Their number depends only on the size of an observation.
     together <- max(1L, min(64L, 8192L %/% ncol(values)))
     if (playing$taken %% together == 0L) add_noted(batch)
   }
@@ -160,7 +163,7 @@ end_step <- function(batch, playing, action, out) {
   }
   playing$observation <- out$observation
   ended <- out$terminated | out$truncated
-  # After cutting an episode off, the environment does not start the next one itself.
+  # If `max_steps` cuts an episode off, the environment does not start the next one itself.
   waiting <- if (isTRUE(batch$vector_env$begins_next)) !ended else TRUE
   if (batch$max_steps < Inf) ended <- ended | playing$taken - rows$began >= batch$max_steps
   if (any(ended)) {
@@ -208,9 +211,9 @@ begin_next_episodes <- function(batch, playing, ended, waiting) {
   }
 }
 
-# Resets the sub-environments of new episodes. If all must be reset together, the result omits those
-# that do not play. A sub-environment that restarts itself gets the seeds of all its episodes, up to
-# the episode `last`.
+# Resets the sub-environments of new episodes. If all must be reset together, the result has only
+# those that play. A sub-environment that starts its next episode itself gets the seeds of all its
+# episodes, up to the episode `last`.
 begin_episodes <- function(batch, episode, last) {
   vector_env <- batch$vector_env
   sub_envs <- batch$sub_env[episode]
@@ -230,7 +233,7 @@ begin_episodes <- function(batch, episode, last) {
   observation
 }
 
-# Call a function with a single observation before it plays several episodes together.
+# Before a user's function plays several episodes together, calls it with a single observation.
 ask_beforehand <- function(batch, episode, observation, begun = seq_along(episode)) {
   policy <- batch$policy
   vector_env <- batch$vector_env
@@ -259,8 +262,8 @@ keep_frame <- function(batch, episode) {
   }
 }
 
-# An episode that the environment neither terminated nor truncated was cut off by `max_steps`, which
-# counts as truncated.
+# If the environment neither terminated nor truncated an episode, `max_steps` cut it off: it counts
+# as truncated.
 end_episodes <- function(batch, at, returns, length, out) {
   batch$return[at] <- returns
   batch$length[at] <- length
@@ -273,9 +276,8 @@ end_episodes <- function(batch, at, returns, length, out) {
   }
 }
 
-# The number of episodes that are needed: those up to the first candidate whose mean return reaches
-# the target. An earlier candidate with missing returns is played to its end, because it may reach
-# the target, too.
+# The number of episodes that are needed: all up to the first candidate whose mean return reaches
+# the target. Earlier candidates must finish, because they may reach the target, too.
 needed_episodes <- function(returns, each, target) {
   n <- length(returns)
   reached <- if (n >= each) which(colMeans(matrix(returns, each)) >= target)

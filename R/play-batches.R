@@ -1,22 +1,23 @@
-# Episodes of many candidates. Those that the server plays itself are requested in large pieces
-# (play-beside.R); others are divided into batches and played from R, batch after batch.
+# Episodes of many candidates. If the server plays whole episodes, R requests them in large pieces
+# (play-beside.R). Otherwise R plays them itself, batch after batch.
 #
-# The rule: episodes are taken candidate by candidate. A batch has as many whole candidates as fit,
-# and at least one; a candidate with more episodes than that has its own batches. The size of a
-# batch (`batch_size`) depends on the environment: as many episodes as sub-environments if these
-# wait for each other, four times as many if each plays on independently. An environment that
-# remembers something over episodes plays all of them in one batch.
+# The rule: batches take the episodes candidate by candidate. A batch has as many whole candidates
+# as fit; a candidate with more episodes than a batch has batches of its own. The size of a batch
+# (`batch_size`) depends on the environment: as many episodes as sub-environments if these wait for
+# each other, four times as many if each plays on independently. If a wrapper remembers earlier
+# episodes, all episodes are in one batch.
 #
 # So the number of cores, the worker and the time never change the result.
 
 #' Make an empty history of batches
 #'
-#' @param candidates,episodes The number of candidates, and of episodes of each.
+#' @param candidates,episodes The number of candidates, and the number of episodes of each.
 #' @param streams As made by [new_streams()].
 #' @param common_seeds Whether all candidates use the same seeds for their episodes, if each episode
 #'   has its own seed.
-#' @return An environment: these, the number of episodes played, `batches`, the results of
-#'   [play_batch()], and `draw_seeds`, a function that draws a number of seeds of episodes.
+#' @return An environment with the arguments, `played_episodes` (the number of episodes played),
+#'   `batches` (the results of [play_batch()]), and `draw_seeds`, a function that draws so many
+#'   seeds of episodes.
 #' @noRd
 new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
   rlang::env(
@@ -31,8 +32,8 @@ new_history <- function(candidates, episodes, streams, common_seeds = FALSE) {
 #' @param vector_env As returned by [env_for_policy()], or by [stepped()] with a learner.
 #' @param history As returned by [new_history()]. After an error or an interrupt it has the batches
 #'   that were played.
-#' @param policy_of A function of the numbers of the candidates of a batch, which returns the policy
-#'   that plays it; `candidate` then counts from 1 in this policy.
+#' @param policy_of A function of the numbers of the candidates in a batch. It returns the policy
+#'   that plays the batch, with only these candidates.
 #' @param report A function that is called with the number of finished episodes in the current
 #'   batch.
 #' @param ... Further arguments of [play_batch()].
@@ -57,13 +58,13 @@ play_batches <- function(vector_env, history, policy_of, report = function(ended
     ))
   }
   for (batch in batches) {
-    # Its policy contains only its candidates.
+    # The policy contains only the candidates of the batch.
     policy <- policy_of(unique(batch$episodes$candidate))
     played <- play_batch(
       vector_env, policy, batch$episodes, batch$stream, each = batch$each, report = report, ...,
       keep_steps = keep_steps, learner = learner, max_steps = max_steps
     )
-    # After an interrupt the batch is added completely or not at all.
+    # An interrupt must not come between: a batch is added completely or not at all.
     suspendInterrupts(enter_batch(history, played))
   }
 }
@@ -79,8 +80,8 @@ check_has_end <- function(vector_env, max_steps) {
 
 #' Draw what each batch is played with
 #'
-#' The result of a batch depends only on this. Batches can be played in any order, if they are added
-#' in theirs.
+#' The result of a batch depends only on this. So batches can be played in any order, if their
+#' results are added in the order of the batches.
 #' @return A list with a list for each batch: `episodes`, as for [play_batch()], `each`, the number
 #'   of episodes of a candidate, and `stream`.
 #' @noRd
@@ -136,12 +137,12 @@ episode_results <- function(history) {
 
 #' Call a function with the vector environment of an environment
 #'
-#' A vector environment that was made for this is closed when `play` returns.
+#' If this makes the vector environment, it closes it when `play` returns.
 #' @param episodes The largest number of episodes.
 #' @param play A function of the vector environment.
 #' @param max_steps The user's value. A smaller limit of the environment gives a warning.
 #' @param ... Further arguments of [as_vector_env()].
-#' @param client The user's client. Its default starts a server, so it is only passed on: a method
+#' @param client The user's client. Its default starts a server, so this only passes it on: a method
 #'   for an environment without a server never evaluates it.
 #' @param seed The seed of a random map, see [with_random_map()].
 #' @noRd
@@ -208,7 +209,8 @@ warn_of_own_limit <- function(max_steps, vector_env, call) {
   }
 }
 
-# Why R plays one episode after the other, or step by step, if it was decided here.
+# Tells the user why R plays one episode after the other, or step by step, if a wrapper is the
+# reason.
 inform_of_play <- function(vector_env, env) {
   given <- given_id(env)
   if (length(vector_env$remembers) && !is.null(given)) {
@@ -228,13 +230,13 @@ inform_of_play <- function(vector_env, env) {
   }
 }
 
-# Progress, interrupts, and the results of what ended early ---------------------------------
+# Progress, interrupts, and results after an early end ---------------------------------------
 
 #' Play until the end or an interrupt
 #'
 #' @param play Code that plays.
 #' @param text A message for an interrupt, for cli, with `{finished}` and, if given, `{total}`.
-#' @param count_finished A function that returns the number of finished ones, or a text.
+#' @param count_finished A function that returns the number of finished units, or a text.
 #' @return Whether there was an interrupt, logical.
 #' @noRd
 until_interrupted <- function(play, text, count_finished, total = NULL) {
@@ -272,7 +274,7 @@ progress_bar <- function(total, unit, note = "", shown = TRUE, frame = parent.fr
       updated <<- finished
       cli::cli_progress_update(set = finished, extra = list(note = note), id = bar, .envir = frame)
     }
-    # At most a hundred signals, because each takes a while.
+    # Send at most a hundred signals, because each takes a while.
     amount <- finished - signalled
     if (signals && (amount >= total / 100 || finished >= total && amount > 0)) {
       progress(note, amount = amount)
@@ -281,8 +283,8 @@ progress_bar <- function(total, unit, note = "", shown = TRUE, frame = parent.fr
   }
 }
 
-# The error keeps the classes and fields of the original one: code that expects a lost connection
-# need not know that it was lost during play.
+# The error keeps the classes and fields of the original error. So code that handles a lost
+# connection also works for one that was lost during play.
 abort_with_result <- function(cnd, what, result, played, class, call, hint = NULL) {
   own <- c("message", "call", "parent", "trace", "body", "header", "footer", "rlang",
            "use_cli_format")
@@ -296,10 +298,10 @@ abort_with_result <- function(cnd, what, result, played, class, call, hint = NUL
   )
 }
 
-# In a program of its own ------------------------------------------------------------------------
+# Policies with a program of their own -----------------------------------------------------------
 
-# Policies that play whole episodes in a program of their own, which also makes the environment,
-# such as those that stay with Stable-Baselines3.
+# Some policies play whole episodes in a program of their own, which also makes the environment. An
+# example is a policy that only Stable-Baselines3 can run.
 
 #' Play whole episodes with a policy that has a program of its own
 #'
@@ -308,8 +310,8 @@ abort_with_result <- function(cnd, what, result, played, class, call, hint = NUL
 #' @param episodes A list of vectors with an element for each episode, as for [play_batch()].
 #' @param keep What to keep of the steps, a character vector of `"steps"` and `"next_observation"`.
 #' @param report A function that is called with the number of finished episodes.
-#' @return A list: `batch`, as returned by [play_batch()], for the first episodes or all; and what
-#'   ended it early, if anything did: `error`, a condition, or `interrupted`.
+#' @return A list: `batch`, as returned by [play_batch()], for the first episodes or all; `error`,
+#'   the condition that ended it early, or `NULL`; and `interrupted`, whether an interrupt did.
 #' @noRd
 play_whole <- function(policy, vector_env, episodes, max_steps, keep, report) {
   UseMethod("play_whole")
@@ -330,7 +332,7 @@ seen_by <- function(policy, vector_env) {
   vector_env
 }
 
-# One candidate after the other.
+# Plays one candidate after the other.
 play_apart <- function(vector_env, history, policy_of, report, max_steps, keep_steps,
                        keep_next = FALSE) {
   keep <- c("steps", "next_observation")[c(keep_steps, keep_next)]

@@ -1,18 +1,17 @@
-# Episodes that are played beside the environment: the policy is data, and the server's worker
-# processes play whole episodes with it. An episode depends only on environment, policy, seed and
-# `max_steps` (in a group also on its row). So the division into requests does not change the
-# result.
+# Playing beside the environment: the policy is data, and the server's worker processes play whole
+# episodes with it. An episode depends only on the environment, the policy, the seed and `max_steps`
+# (in a group, also on its row). So it does not matter how the episodes are divided into requests.
 #
-# The episodes are divided into pieces, each of which is a request, or a task for a worker of the
-# plan. Answers may come in any order; they are added in the order of the episodes.
+# R divides the episodes into pieces. Each piece is a request, or a task for a worker of the plan.
+# Answers may come in any order; R adds them in the order of the episodes.
 
 #' Choose how a policy plays
 #'
 #' @param vector_env As passed on by [with_vector_env()].
 #' @param policy The policy, bound to the environment, or several candidates.
 #' @param max_steps,keep_steps As for [play_batch()].
-#' @return The environment that plays: a described one, one that is stepped from R, or one that is
-#'   `apart`: the policy's own program makes another.
+#' @return The vector environment that plays: one that the server only described, one that R steps,
+#'   or one that is `apart`, for which the policy's own program makes the environment.
 #' @noRd
 env_for_policy <- function(vector_env, policy, max_steps = Inf, keep_steps = FALSE) {
   vector_env$apart <- plays_apart(policy)
@@ -27,7 +26,7 @@ stepped <- function(vector_env) {
   if (is.null(vector_env$description)) vector_env else vector_env$make_stepped()
 }
 
-# The server does not play episodes without a limit if they may never end.
+# The server refuses to play episodes that may never end.
 plays_beside <- function(vector_env, policy, max_steps, keep_steps) {
   if (is.null(vector_env$description)) {
     return(FALSE)
@@ -60,8 +59,8 @@ most_numbers <- 1e6
 
 #' List all episodes, candidate by candidate, with their seeds
 #'
-#' A group has consecutive episodes, of as many candidates as fit into a request. If candidates play
-#' the same episodes, each starts a group.
+#' A group has consecutive episodes; it does not cross the end of a full request. If all candidates
+#' play the same episodes, each candidate starts a new group.
 #' @param most The number of candidates that fit into a request.
 #' @return A list of vectors with an element for each episode: `candidate`, `episode`, `seed`,
 #'   `sub_env` and, if episodes are played in groups, `row` (from 0).
@@ -80,7 +79,7 @@ list_episodes <- function(vector_env, history, most) {
     columns$sub_env <- at %% vector_env$num_envs + 1L
     return(columns)
   }
-  # The product may be beyond R's integers.
+  # The product may be too large for R's integers.
   within <- if (common) at %% each else at %% (as.numeric(most) * each)
   columns$row <- as.integer(within %% group)
   number <- if (common) within %/% group + 1L else cumsum(columns$row == 0L)
@@ -89,12 +88,13 @@ list_episodes <- function(vector_env, history, most) {
   columns
 }
 
-# The state of playing. `begins`: the first episode of each unit (a group, or an episode), which is
-# never divided, and finally the number after all. `next_unit` and `size`: the next piece's first
-# unit and number of units. `again`: pieces whose end the server left out. `pieces`: the results, by
-# the number of the first episode. `returns` of all episodes; `played` and `entered`, their numbers;
-# `needed`, how many are needed, given the target; `failed`, the first episode that failed, and its
-# error.
+# The state of playing. A unit is a group or an episode, and is never divided. `begins`: the first
+# episode of each unit, and the number after the last episode. `next_unit` and `size`: the first
+# unit of the next piece, and its number of units. `again`: the ends of pieces that the server left
+# out. `pieces`: results that wait for their turn, by the number of their first episode. `returns`:
+# the returns of all episodes. `played` and `entered`: how many episodes were played, and how many
+# were added to the result. `needed`: how many are needed, given the target. `failed`: the first
+# episode that failed, and its error.
 new_play <- function(vector_env, episodes, policy_of, max_steps, keep, enter, most = 1L, each = 1L,
                      target = NULL, report = function(ended) NULL) {
   n <- length(episodes$seed)
@@ -120,7 +120,7 @@ take_piece <- function(play, size = play$size) {
   }
   begins <- play$begins
   unit <- play$next_unit
-  # The number after all episodes is never needed.
+  # The number after the last episode is larger than `needed`, so playing stops there, too.
   if (begins[[unit]] > play$needed || !is.null(play$failed)) {
     return(NULL)
   }
@@ -134,7 +134,7 @@ take_piece <- function(play, size = play$size) {
 
 #' Record the results of a piece
 #' @param batch As returned by [play_batch()], for the first episodes of the piece or for all.
-#' @param error The error of the episode after these: `NULL`, or a list like a response, with
+#' @param error The error of the next episode after `batch`: `NULL`, or a list like a response, with
 #'   `status_code`, `url` and `answer`.
 #' @return Whether everything that is needed has been played.
 #' @noRd
@@ -163,7 +163,7 @@ enter_in_order <- function(play) {
     if (is.null(batch) || play$entered >= play$needed) break
     wanted <- play$needed - play$entered
     if (length(batch$return) > wanted) {
-      # If later candidates are left out, steps are not kept.
+      # Only searches with a target leave candidates out, and they keep no steps.
       batch <- lapply(batch[names(batch) != "steps"], utils::head, wanted)
     }
     play$enter(batch)
@@ -180,7 +180,7 @@ enter_in_order <- function(play) {
 
 # Tasks for workers --------------------------------------------------------------------------
 
-# A worker's task is a list of episodes, which it plays on its own server by requests.
+# A task is a list of episodes. The worker requests them from its own server.
 play_tasks <- function(play) {
   most <- ceiling((length(play$begins) - 1L) / (2 * future::nbrOfWorkers()))
   play$size <- min(most, 16L)
@@ -210,7 +210,7 @@ play_tasks <- function(play) {
   do_tasks(next_task, batch_deadline, play$vector_env$call)
 }
 
-# Its policy contains only its candidates.
+# The policy of a task contains only the candidates of its episodes.
 episodes_task <- function(play, piece) {
   vector_env <- play$vector_env
   episodes <- lapply(play$episodes, `[`, piece$first:piece$last)
@@ -222,7 +222,7 @@ episodes_task <- function(play, piece) {
 }
 
 #' Play a list of episodes
-#' @return A list: `batches`, the results, and `error`, that of the episode after them, see
+#' @return A list: `batches`, the results, and `error`, the error of the next episode, see
 #'   [take_played()].
 #' @noRd
 play_listed_episodes <- function(vector_env, task) {

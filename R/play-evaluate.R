@@ -1,10 +1,10 @@
 #' Evaluate policies
 #'
-#' Play each policy in the same number of episodes and return its mean return with a confidence
-#' interval. The single episodes are not kept; use [rollout()] to get them.
+#' Play each policy for the same number of episodes, and compute its mean return with a confidence
+#' interval. To get the results of single episodes, use [rollout()].
 #'
-#' All candidates play the same episodes, so none is favoured by luck. The exception is R stepping
-#' sub-environments that share a seed (see [as_vector_env()]).
+#' All policies play the same episodes, so none has easier ones by luck. The exception: if R steps
+#' sub-environments that share a seed (see [as_vector_env()]), their episodes differ.
 #'
 #' @inheritParams rollout
 #' @param policy As for [rollout()]: one policy, a list of several, or [policy_candidates()].
@@ -14,8 +14,8 @@
 #' @return A data frame of class `gym_evaluation` with one row for each policy. `candidate` is its
 #'   number (integer), `mean_return` the mean return of its episodes, `se` the standard error of
 #'   this mean, `lower` and `upper` the bounds of the confidence interval (doubles, `NA` for a
-#'   single episode), `episodes` and `steps` the numbers played (integers). Rows have the names of
-#'   policies in a list, or of rows of weights.
+#'   single episode), `episodes` and `steps` the numbers of episodes and steps played (integers).
+#'   Rows have the names of policies in a list, or of rows of weights.
 #' @section Errors: As for [rollout()].
 #' @references The interval is that of [stats::t.test()].
 #' @seealso [plot()][plot.gym_evaluation()] for a picture; [rollout()], whose
@@ -59,7 +59,7 @@ evaluate_policy.default <- function(env, policy, episodes = 100, seed = NULL, ..
 }
 
 #' Evaluate each candidate by its episodes
-#' @param episodes A table of episodes, with a column `candidate` where there are several.
+#' @param episodes A table of episodes, with a column `candidate` if there are several policies.
 #' @return A data frame, see [evaluate_policy()].
 #' @noRd
 evaluate_episodes <- function(episodes, policy, level = 0.95) {
@@ -69,7 +69,7 @@ evaluate_episodes <- function(episodes, policy, level = 0.95) {
   mean_return <- column(function(own) mean(own$return), 0)
   se <- column(function(own) standard_error(own$return), 0)
   count <- column(nrow, 0L)
-  # A single episode has no interval, and no quantile for one.
+  # A single episode has no interval: `se` is NA. pmax() avoids a warning of qt().
   beyond <- se * stats::qt((1 + level) / 2, pmax(count - 1L, 1L))
   numbers <- as.integer(names(each))
   data.frame(
@@ -108,7 +108,7 @@ check_level <- function(level, call = rlang::caller_env()) {
 
 level_text <- function(level) paste0(format(100 * level), "%")
 
-# Prints a row for each candidate, or for the ones with the highest mean returns of many.
+# Prints a row for each candidate. If there are many, only those with the highest mean returns.
 print_candidates <- function(x, level = 0.95, most = 10L) {
   few <- nrow(x) <= most
   shown <- if (few) seq_len(nrow(x)) else order(-x$mean_return)[seq_len(most)]
@@ -127,21 +127,22 @@ evaluation_columns <- c("candidate", "mean_return", "se", "lower", "upper", "epi
 
 #' The return of a policy as a function of its weights
 #'
-#' Make a function for optimisers such as [stats::optim()], which minimise. It plays the policy with
-#' a vector of weights and returns minus its mean return. It plays the same episodes each time, so
-#' equal weights have equal values.
+#' Make a function for optimisers such as [stats::optim()], which minimise. The function plays the
+#' policy with a vector of weights, and returns minus the mean return. It plays the same episodes
+#' each time, so equal weights have equal values.
 #'
 #' @inheritParams evaluate_policy
-#' @param policy The policy whose weights are the argument: a network, by default [policy_linear()].
-#'   Its moments of observations do not change.
-#' @param episodes The number of episodes for a mean, a whole number of at least 1. The default
-#'   is 10.
-#' @param seed A whole number that fixes the episodes. `NULL`, the default, draws one, once.
+#' @param policy The policy whose weights are the function's argument: a network, by default
+#'   [policy_linear()]. If it normalises observations, their means and variances stay as they are.
+#' @param episodes The number of episodes that a mean return is computed from, a whole number of at
+#'   least 1. The default is 10.
+#' @param seed A whole number that fixes the episodes. `NULL`, the default, draws one when you make
+#'   the function.
 #' @return A function of class `gym_objective`. Its argument `weights` is a numeric vector in the
 #'   order of [coef()][coef.gym_policy_network], or a matrix with the weights of a candidate in each
-#'   row, which are played together. It returns minus the mean return of each, a numeric vector. Its
-#'   attribute `policy` is the policy, bound to the environment: `coef(attr(f, "policy"))` are
-#'   weights to start with.
+#'   row; candidates are played together. It returns minus the mean return of each candidate, a
+#'   numeric vector. Its attribute `policy` is the policy, bound to the environment: `coef(attr(f,
+#'   "policy"))` gives weights to start with.
 #' @section Errors: As for [rollout()]. The function raises a `gym_error_argument` for a wrong
 #'   number of weights.
 #' @seealso [train_agent()], [evaluate_policy()]
@@ -188,8 +189,8 @@ gym_objective <- function(env, policy = policy_linear(), episodes = 10, seed = N
 }
 
 # Returns a function that plays the same episodes with each candidate and returns the mean returns.
-# It must not draw random numbers: optim(method = "SANN") draws in C and would go on from the same
-# state each time.
+# That function must not draw random numbers: each draw in R would reset the generator that
+# optim(method = "SANN") uses in C.
 same_episodes <- function(seed, episodes, max_steps) {
   streams <- new_streams(seed)
   seeds <- with_generator(streams$seeds, draw_environment_seeds(episodes))
@@ -208,8 +209,8 @@ same_episodes <- function(seed, episodes, max_steps) {
     colMeans(matrix(episode_results(history)$returns, episodes))
   }
   function(vector_env, candidates, count) {
-    # If R steps sub-environments that share a seed, candidates played together would play different
-    # episodes.
+    # If R steps sub-environments that share a seed, candidates that play together would get
+    # different episodes.
     playing <- env_for_policy(vector_env, candidates, max_steps %||% Inf)
     if (!playing$one_seed || !is.null(playing$description)) {
       play(playing, candidates, seq_len(count))

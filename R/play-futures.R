@@ -1,10 +1,10 @@
-# Tasks for the workers of the plan set with future::plan(). Each task is a future, and there are
-# never more than free workers. The result of a task does not depend on the worker, so a lost task
-# is done again. Results are put together in the order of the tasks.
+# Tasks for the workers of the plan set with future::plan(). Each task is a future. There are never
+# more futures than free workers. The result of a task does not depend on the worker, so a lost task
+# can be done again. Results are combined in the order of the tasks.
 #
-# A worker whose future has failed is left alone: its future is never asked for again. future before
-# 1.40 then counts the worker as busy and gives it nothing more. Later versions start another worker
-# in its place.
+# If a future has failed, R never asks for its value again. The package future before 1.40 then
+# counts the worker as busy and gives it nothing more. Later versions start another worker in its
+# place.
 
 most_tries <- 3L
 
@@ -18,7 +18,7 @@ most_tries <- 3L
 #' @param call The call that errors name.
 #' @noRd
 do_tasks <- function(next_task, deadline, call) {
-  # Futures are checked only when their worker has sent something, so there is no need to wait.
+  # R checks a future only when its worker has sent something, so future need not wait.
   old <- options(future.resolved.timeout = 0)
   on.exit(options(old))
   crew <- rlang::env(
@@ -44,7 +44,8 @@ do_tasks <- function(next_task, deadline, call) {
 #' @param task A function of a number, which returns the data to send.
 #' @param enter A function of a task's value, called when all values before it were entered.
 #' @param here A function that does a task in this session.
-#' @param report A function of the values that came before their turn, called after each.
+#' @param report A function that is called after each task, with the values that wait for their
+#'   turn.
 #' @noRd
 do_in_order <- function(count, task, enter, deadline, call, here = run_task,
                         report = function(waiting) NULL) {
@@ -76,16 +77,17 @@ do_in_order <- function(count, task, enter, deadline, call, here = run_task,
 longest_wait <- 0.5
 longest_wait_without_deadline <- 10
 
-# Waits until a worker has sent something and returns the candidates. Polling future would take the
-# core that a local worker needs, so the session sleeps on the workers' connections. Now and then
-# all are checked: future may have read an answer itself.
+# Waits until a worker has sent something, and returns the numbers of tasks that may be ready.
+# Polling future would use a core that a local worker needs, so this sleeps on the workers'
+# connections. From time to time it returns all tasks, because future may have read an answer
+# itself.
 await_workers <- function(crew) {
   if (!length(crew$running)) {
     return(integer())
   }
   ready <- select_workers(crew$running)
   if (is.null(ready)) {
-    # A hundredth of the time since the last task was sent.
+    # Sleep for a hundredth of the time since the last task was sent.
     waited <- now() - max(vapply(crew$running, function(one) one$started, 0))
     has_deadline <- is.finite(crew$deadline(crew$slowest))
     longest <- if (has_deadline) longest_wait else longest_wait_without_deadline
@@ -114,8 +116,8 @@ worker_node <- function(future) {
   if (is.list(workers) && !is.null(future$node)) workers[[future$node]]
 }
 
-# Futures of an interrupted call keep their workers busy until somebody takes their values. Those
-# cancelled with their plan are not taken: future would start workers for them.
+# Futures of an interrupted call keep their workers busy until somebody takes their values. Do not
+# take those that were cancelled with their plan: future would start workers for them.
 collect_left_futures <- function() {
   is_under_way <- function(future) {
     identical(future$state, "running") &&
@@ -124,7 +126,7 @@ collect_left_futures <- function() {
   the_session$left_futures <- Filter(is_under_way, the_session$left_futures)
 }
 
-# The next task: a lost one, or a new one.
+# Returns the next task: first the lost ones, then a new one.
 take_task <- function(crew) {
   if (length(crew$again)) {
     one <- crew$again[[1L]]
@@ -167,13 +169,13 @@ workers_note <- function() {
   if (plan_kind() == "kept") paste0(count_of(free_workers(), "worker"), ", ")
 }
 
-# The first sentence of a message; those of future are long.
+# The first sentence of a message, because messages of future are long.
 first_message_line <- function(cnd) {
   line <- c(strsplit(cnd$message %||% "", "\n", fixed = TRUE)[[1L]], "")[[1L]]
   sub("[.] [A-Z].*", "", line)
 }
 
-# The task is sent as bytes, which are decoded after the worker is known to have the package.
+# Sends the task as bytes. The worker decodes them only after it has found the package.
 launch <- function(task) {
   run <- function(bytes) {
     if (!requireNamespace("gym", quietly = TRUE)) {
@@ -197,7 +199,7 @@ do_here <- function(crew) {
   if (!is.null(one)) one$done(one$here())
 }
 
-# Checks a task that may be `ready`. It is lost if it is not ready for too long.
+# Checks a running task, which may be `ready`. After its deadline it counts as lost.
 look_at <- function(crew, number, ready) {
   one <- crew$running[[number]]
   seconds <- now() - one$started
@@ -236,7 +238,7 @@ task_failed <- function(crew, one, state) {
     error$host <- state$host
     stop(error)
   }
-  # The plan may not know it.
+  # The plan may not know the worker's host.
   host <- state$host %||% worker_node(one$future)$host %||% "an unknown host"
   reason <- state$failed %||% first_message_line(state$error)
   last <- one$tries >= most_tries

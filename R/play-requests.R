@@ -1,7 +1,7 @@
-# Request episodes from a server and read its answers.
+# Requests episodes from a server and reads its answers.
 
-# The intended time of a request, in seconds: progress is shown this often, and an interrupt waits
-# at most this long for the server.
+# The intended time of a request, in seconds. The progress bar moves this often, and an interrupt
+# waits at most about this long for the server.
 request_seconds <- 0.25
 
 #' Play by requests, two at a time
@@ -31,13 +31,14 @@ play_requests <- function(play) {
   )
 }
 
-# The number of units of the first piece. A unit may take longer than last time with another policy.
+# The number of units of the first piece: half of the last size, because with another policy a unit
+# may take longer.
 first_size <- function(play) {
   least <- if (is.null(play$episodes$row)) play$vector_env$description$processes else 1L
   max(least, (play$vector_env$known$size %||% 0L) %/% 2L)
 }
 
-# The number of units of the next piece, chosen so that it takes so many seconds.
+# The number of units of the next piece, so that it takes about `wanted` seconds.
 next_size <- function(units, seconds, wanted) {
   as.integer(max(1, min(8 * units, units * wanted / max(seconds, 0.001), 2^20)))
 }
@@ -79,8 +80,8 @@ data_tensor <- function(values, dtype) {
 # Answers ------------------------------------------------------------------------------------
 
 #' Read the answer to a piece
-#' @return A list: `batch`, as returned by [play_batch()], and `error`, that of the episode after
-#'   those of the batch, see [take_played()].
+#' @return A list: `batch`, as returned by [play_batch()], and `error`, the error of the next
+#'   episode, see [take_played()].
 #' @noRd
 read_played <- function(play, piece, response) {
   call <- play$vector_env$call
@@ -138,7 +139,7 @@ read_moments <- function(tensors, n) {
   lapply(seq_len(n), function(i) new_moments(count[[i]], mean[i, ], squares[i, ]))
 }
 
-# The steps of some episodes, in the form in which play_batch() keeps those taken together.
+# The steps of some episodes, in the same form as one element of the `steps` of play_batch().
 read_steps <- function(play, lengths, answer) {
   vector_env <- play$vector_env
   n <- sum(lengths)

@@ -1,56 +1,56 @@
 #' Play whole episodes
 #'
-#' Play a policy in an environment for a number of episodes and return their results. An environment
-#' given by its id is made for the rollout and always closed afterwards. One made by [gym_make()]
-#' stays open, in its last episode.
+#' Play a policy in an environment for a number of episodes and return their results. If you give an
+#' id, the rollout makes the environment and closes it afterwards. An environment made by
+#' [gym_make()] stays open, in its last episode.
 #'
 #' The return of an episode is the sum of its rewards, its length the number of its steps. One whole
 #' number, `seed`, determines all random numbers: the seeds of the episodes and the actions of a
-#' random policy. Without it, one seed is drawn from R's generator, so [set.seed()] fixes
-#' everything, too. (The weights of a policy made in the call are drawn separately.)
+#' random policy. Without `seed`, the rollout draws one from R's generator, so [set.seed()] fixes
+#' everything, too. (The weights of a policy that you make in the call are drawn separately.)
 #'
 #' # Ways to play
 #'
-#' **Beside the environment**: the policy is sent to the server, whose processes play whole episodes
-#' with it. This applies if the environment is given by its id (with arguments, and wrappers of
+#' **Beside the environment**: R sends the policy to the server, whose processes play whole episodes
+#' with it. This is the way if you give the environment by its id (with arguments, and wrappers of
 #' [gym_wrap()]) and the policy is data: [policy_random()], [policy_network()], [policy_linear()],
 #' [policy_table()], [policy_candidates()] and lists of these. An episode, including the random
 #' numbers of its policy, then depends only on the environment, the policy, its seed and
 #' `max_steps`. The number of processes and the other episodes do not matter.
 #'
-#' **Step by step**: R chooses the actions of each step. This applies to everything else:
+#' **Step by step**: R chooses the actions of each step. This is the way for everything else:
 #' * functions, models and other policies that only R can run,
 #' * an environment that was made before or is written in R,
 #' * `frames = TRUE`, and wrappers that remember earlier episodes,
 #' * episodes without a step limit, by the environment or `max_steps`,
-#' * a vector implementation such as CartPole's with a `num_envs` other than 256.
+#' * an environment with its own vector implementation, such as CartPole, if `num_envs` is not 256.
 #'
-#' **By Stable-Baselines3**: a policy of [learn_sb3()] that is no network of R plays whole episodes
-#' in a process of its own.
+#' **By Stable-Baselines3**: a policy of [learn_sb3()] that R cannot run as a network plays whole
+#' episodes in a process of its own.
 #'
-#' Many episodes are played together in sub-environments, except with frames. The policy gets only
-#' the episodes that are still running, so a function gets fewer rows at the end.
+#' Many episodes are played together, in sub-environments, except with frames. The policy gets the
+#' observations of the episodes that are still running, so a function gets fewer rows at the end.
 #'
-#' [provenance()] names the way. `vignette("playing", package = "gym")` has details, and explains
-#' how to start an episode of the result again.
+#' [provenance()] says which way a result was played. `vignette("playing", package = "gym")` has
+#' details, and explains how to start an episode of the result again.
 #'
 #' @param env The environment: an id, such as `"CartPole-v1"` (with wrappers, see [gym_wrap()]), or
 #'   an environment made by [gym_make()], with or without sub-environments.
 #' @param policy The policy: made by [policy_random()] or [policy_network()], or a function of many
 #'   observations that returns as many actions. For the usual environments that is a function of a
 #'   matrix with an observation in each row, one for each running episode, see [act()].
-#'   [as_policy()] makes a policy from a fitted model. A training plays as its policy. Or several
-#'   policies, the candidates, which are played together: a list of policies, [policy_candidates()],
-#'   or trainings with several seeds.
+#'   [as_policy()] makes a policy from a fitted model. You can also give a training, which plays its
+#'   policy. To play several policies together, the candidates, give a list of policies,
+#'   [policy_candidates()], or trainings with several seeds.
 #' @param episodes The number of episodes, for each candidate, a whole number of at least 1. The
 #'   default is 1.
 #' @param max_steps The number of steps after which an episode is cut off, a whole number of at
-#'   least 1. Such an episode counts as truncated. `NULL`, the default, leaves it to the
-#'   environment. In an environment without a limit, a policy that never fails plays forever. No
-#'   episode goes beyond the environment's own limit;
-#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` changes that limit.
+#'   least 1. Such an episode counts as truncated. `NULL`, the default, uses only the environment's
+#'   own limit. If the environment has none, a policy that never fails plays forever. `max_steps`
+#'   cannot raise the environment's own limit; `gym_make("MountainCar-v0", max_episode_steps =
+#'   1000)` changes that limit.
 #' @param seed A whole number of at most 2^53 that fixes all random numbers, for any [RNGkind()] of
-#'   the session. The session's generator is left as it was. `NULL`, the default, draws a seed from
+#'   the session. The session's generator does not change. `NULL`, the default, draws a seed from
 #'   the session's generator.
 #' @param steps Keep each step, in a table? `FALSE`, the default, or `TRUE`.
 #' @param client The client of the server that makes an environment given by its id. The default is
@@ -61,17 +61,17 @@
 #' @param ... Arguments of the environment, by name, such as `is_slippery = FALSE` for FrozenLake,
 #'   if it is given by its id.
 #' @param num_envs The number of sub-environments, a whole number, if the environment is given by
-#'   its id. If the server plays whole episodes, it only numbers them in the column `sub_env`.
-#'   `NULL`, the default, chooses, see [as_vector_env()].
+#'   its id. If the server plays whole episodes, this number changes nothing except the column
+#'   `sub_env`. `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step, in columns whose names begin with
-#'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`; only with `steps`. At the
-#'   end of an episode it is that episode's last observation.
+#'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`, which requires `steps =
+#'   TRUE`. At the end of an episode it is the last observation of that episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_workers The number of the server's processes that run the sub-environments if R plays
 #'   step by step, a whole number; 0 for the server's own process. The result does not depend on it.
-#'   `NULL`, the default, lets the server choose, see [as_vector_env()]. Only if the environment is
-#'   given by its id and has no vector implementation of its own, as CartPole has. If the server
-#'   plays whole episodes, it always chooses.
+#'   `NULL`, the default, lets the server choose, see [as_vector_env()]. Use it only for an
+#'   environment given by its id without a vector implementation of its own (CartPole has one). If
+#'   the server plays whole episodes, it always chooses itself.
 #' @return An object of class `gym_rollout`, with methods for [print()], [summary()],
 #'   [plot()][plot.gym_rollout()] and [as.data.frame()]. It is a list with the elements
 #'   \describe{
@@ -105,8 +105,8 @@
 #'   that does not fit the environment, or a function that does not return one action for each
 #'   observation. `gym_error_http` if the server refuses the environment or an action.
 #'   `gym_error_connection` if it does not answer. An error during play also has the class
-#'   `gym_error_rollout`, and its field `result` has the finished episodes (step by step, the
-#'   finished batches of episodes).
+#'   `gym_error_rollout`. Its field `result` has the finished episodes (step by step, the finished
+#'   batches of episodes).
 #' @section Warnings: `gym_warning_max_steps` for a `max_steps` beyond the environment's own limit.
 #' @seealso [search_random()]
 #' @export
@@ -159,7 +159,7 @@ rollout <- function(env, policy, episodes = 1, max_steps = NULL, seed = NULL, st
   check_flag(frames)
   check_flag(progress)
   candidates <- count_candidates(policy) %||% 1L
-  # The numbers of all episodes together are integers.
+  # The number of all episodes must fit R's integers.
   most <- .Machine$integer.max %/% candidates
   if (episodes > most) {
     must <- paste("at most", most, "for each of", count_of(candidates, "candidate"))
@@ -295,7 +295,7 @@ print.summary.gym_rollout <- function(x, ...) {
   invisible(x)
 }
 
-# What was played, and by which policy.
+# Lines that say what was played, and by which policy.
 played_lines <- function(x, episodes, steps, what = "Rollout") {
   c(paste0(what, " in ", env_text(x), ": ", count_of(episodes, "episode"), ", ",
            count_of(steps, "step")),

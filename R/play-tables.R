@@ -17,7 +17,7 @@ episodes_table <- function(batches, several = FALSE) {
 }
 
 #' Put the steps of batches into a table, episode after episode
-#' @param episodes The table of their episodes.
+#' @param episodes The table of the episodes of the batches.
 #' @param next_observation Whether to include the observation after each step.
 #' @noRd
 steps_table <- function(batches, episodes, vector_env, several = FALSE, next_observation = FALSE) {
@@ -41,18 +41,20 @@ steps_table <- function(batches, episodes, vector_env, several = FALSE, next_obs
 
 #' Put the steps of batches in order, episode after episode
 #' @inheritParams steps_table
-#' @return A list with an element, or a row, for each step: `row` (that of its episode in the
-#'   table), `observation`, `action`, `reward`, `terminated`, `truncated` and `next_observation`.
+#' @return A list of vectors and batches with an entry for each step: `row` (the row of its episode
+#'   in the table), `observation`, `action`, `reward`, `terminated`, `truncated` and
+#'   `next_observation`.
 #' @noRd
 steps_in_order <- function(batches, episodes, vector_env, next_observation = FALSE) {
   steps <- unlist(lapply(batches, `[[`, "steps"), recursive = FALSE)
   each <- function(name) lapply(steps, `[[`, name)
-  # The row of its episode in the table of episodes, for each step in the order of play.
+  # For each step, in the order of play: the row of its episode in the table of episodes.
   before <- c(0L, cumsum(vapply(batches, function(batch) length(batch$episode), 0L)))
   row <- unlist(lapply(seq_along(batches), function(i) {
     before[[i]] + unlist(lapply(batches[[i]]$steps, `[[`, "at"))
   }))
-  # Step by step, episodes were played in parallel. Stable sorting keeps the steps of each in order.
+  # If R played step by step, steps of several episodes alternate. Stable sorting keeps the steps of
+  # each episode in order.
   mixed <- is.unsorted(row)
   order <- if (mixed) order(row, method = "radix") else seq_along(row)
   bind <- function(name, space) {
@@ -72,9 +74,9 @@ steps_in_order <- function(batches, episodes, vector_env, next_observation = FAL
   )
 }
 
-#' Put steps in order, episode after episode
+#' Put a user's steps in order, episode after episode
 #'
-#' Without `step` the steps of each episode are taken to be in order.
+#' Without a column `step`, the rows of each episode must already be in order.
 #' @param x A user's data frame of steps with some of the columns `candidate`, `episode` and `step`.
 #' @return The data frame, with `episode` numbered over all candidates.
 #' @noRd
@@ -100,15 +102,15 @@ steps_by_episode <- function(x, arg, call) {
   x[order(x[["episode"]], step %||% seq_along(episode)), ]
 }
 
-# How a result was made: what you need to get it again, or to see why another one differs.
+# How a result was made: what somebody needs to reproduce it, or to see why another result differs.
 
 new_provenance <- function(vector_env, settings, started = Sys.time()) {
   system <- Sys.info()
-  # The versions of the server and of what simulates the environment, such as MuJoCo: episodes may
-  # differ from one version to another.
+  # The versions of the server and of the simulator, such as MuJoCo: episodes may differ between
+  # versions.
   versions <- c(server_versions(vector_env$client), vector_env$spec$engine) %||%
     vector_env$model$versions
-  # Such as that of NumPy, which computes the actions of policies that play on the server.
+  # For example the version of NumPy, which computes the actions of policies on the server.
   described <- vector_env$description$versions
   way <- if (!is.null(vector_env$model)) {
     "from the model in R"

@@ -1,49 +1,50 @@
 # Playing on the workers of the plan set with future::plan(): whether it is possible, and how a
-# batch that R plays becomes a task (play-futures.R). Play beside the environment is sent as lists
-# of episodes (play-beside.R).
+# batch that R plays becomes a task (play-futures.R). If the server plays, tasks are lists of
+# episodes (play-beside.R).
 
 #' Play on many cores and machines
 #'
 #' Set a plan of the package future, such as `future::plan(future::multisession, workers = 8)` or
 #' `future::plan(future::cluster, workers = c("host1", "host2"))`. Its workers then play the
 #' episodes of [rollout()], [evaluate_policy()], [search_random()] and the other searches,
-#' [train_agent()] and [gym_objective()]. `train_agent(seeds = )` gives each
-#' worker whole trainings. You need not change any call, and nothing changes without a plan.
+#' [train_agent()] and [gym_objective()]. `train_agent(seeds = )` gives each worker whole trainings.
+#' You need not change any call. Without a plan, nothing changes.
 #'
 #' Results do not depend on the plan, to the last bit. A worker gets a list of episodes, or a batch
-#' of them if R plays step by step (see [rollout()]), and their results do not depend on who plays
-#' them. On another kind of machine the library of linear algebra, NumPy or the processor may change
-#' the last bits. [provenance()] names them, and a different library gives a warning.
+#' of them if R plays step by step (see [rollout()]), whose results are the same on every worker.
+#' Only on another kind of machine, the library of linear algebra, NumPy or the processor may change
+#' the last bits. [provenance()] lists these three, and another library of linear algebra gives a
+#' warning.
 #'
-#' Each worker plays on its own server, which it starts on first use and stops when it ends. The
-#' variable `GYM_SERVER_URL` on the worker, with the token's variable, selects another one (see
-#' [gym_client()]). To avoid overloading the cores, that server plays episodes in as many processes
-#' as future gives the worker cores, normally one. In step-by-step play it runs the sub-environments
-#' in its own process, unless `num_workers` asks for more.
+#' Each worker plays on its own server. The worker starts the server on first use, and stops it at
+#' its own end. The environment variables `GYM_SERVER_URL` and `GYM_SERVER_TOKEN` on the worker
+#' select another server (see [gym_client()]). To avoid overloading the cores, that server plays
+#' episodes in as many processes as future gives the worker cores, normally one. In step-by-step
+#' play it runs the sub-environments in its own process, unless `num_workers` asks for more.
 #'
-#' Functions, such as a policy or that of a wrapper, travel with what they use of the session: its
-#' variables, other functions and attached packages.
+#' A function, such as a policy or the function of a wrapper, can use variables, other functions and
+#' attached packages of the session: these are sent with it.
 #'
 #' The session itself plays what it cannot send, and says so once: an environment given as an
-#' object, or by a client other than the session's own; wrappers that remember something over
+#' object, or made by a client other than the session's own; wrappers that remember earlier
 #' episodes; episodes with frames; agents that learn from each step; a policy, or a wrapper's
-#' function, with a connection or a pointer. Plans whose workers end after each future (`multicore`,
-#' those of batchtools) train whole seeds only.
+#' function, with a connection or a pointer. With plans whose workers end after each future
+#' (`multicore`, those of batchtools), workers only train whole seeds.
 #'
 #' If the package progressr is loaded, its handlers show the progress.
 #'
 #' Set `options(socketOptions = "no-delay")` before the plan, especially if a batch takes less than
-#' a second. Otherwise R waits some 40 ms for an acknowledgement in each message to a worker that
-#' has more than a few thousand bytes.
+#' a second. Otherwise each message of more than a few thousand bytes to a worker takes about 40 ms
+#' longer, because R waits for an acknowledgement.
 #'
-#' @section If a worker is lost:
-#' A worker is lost if it dies, its server fails, or it is silent for longer than the option
-#' `gym.batch_deadline` (in seconds; by default ten times the slowest part of a batch so far, and at
-#' least 60). Another worker then plays its part, with a warning of class `gym_warning_worker` that
-#' names the host. The third time the session plays it. If the plan accepts no more futures, the
-#' session continues alone; set `future::plan("sequential")` and then a plan with new workers to
-#' change that. Since version 1.40 the package future replaces a dead worker if it can. The result
-#' is the same in all cases. The training of a seed has no deadline.
+#' @section If a worker is lost: A worker is lost if it dies, its server fails, or it is silent for
+#' longer than the option `gym.batch_deadline` (in seconds; by default ten times as long as the
+#' slowest task so far, and at least 60). Another worker then does its task, and a warning of class
+#' `gym_warning_worker` names the host. After the third loss of a task, the session does it. If the
+#' plan accepts no more futures, the session continues alone; set `future::plan("sequential")` and
+#' then a plan with new workers to change that. Since version 1.40 the package future replaces a
+#' dead worker if it can. The result is the same in all cases. The training of a seed has no
+#' deadline.
 #'
 #' @section Errors: `gym_error_worker` if a worker lacks the package, or has another version of it
 #'   or of Gymnasium; the field `host` names the worker's machine. An error on a worker is the
@@ -59,7 +60,7 @@
 #' future::plan(future::sequential)
 NULL
 
-# Whether the plan's workers accept tasks: "none" without a plan, "kept" if a worker lives on
+# Whether the plan's workers accept tasks: "none" without a plan, "kept" if a worker stays alive
 # between futures, "short" if each future has its own process.
 plan_kind <- function() {
   if (!"future" %in% loadedNamespaces()) {
@@ -78,8 +79,8 @@ plan_kind <- function() {
   }
 }
 
-# The workers of the plan: the same call of plan() may have started new ones. Since future 1.40 a
-# plan has a backend with its own id.
+# Identifies the workers of the plan, because the same call of plan() may start new ones. Since
+# future 1.40, a plan has a backend with its own id.
 plan_workers <- function() {
   plan <- future::plan("next")
   backend <- attr(plan, "backend", exact = TRUE)
@@ -114,7 +115,7 @@ inform_learner_plays_here <- function() {
   inform_plays_here("a learner learns from each step before it takes the next one")
 }
 
-# Can batches go to workers? If there are workers and it cannot, says why.
+# Can batches go to workers? If there are workers that cannot play them, tells the user why.
 plays_on_workers <- function(vector_env, policy_of, learner) {
   kind <- plan_kind()
   if (kind == "none") {
@@ -153,7 +154,7 @@ play_in_futures <- function(vector_env, batches, history, policy_of, report, ...
     batch <- batches[[number]]
     num_envs <- vector_env$num_envs
     if (!vector_env$one_seed) num_envs <- min(num_envs, length(batch$episodes$episode))
-    # It contains only the candidates of the batch.
+    # The policy contains only the candidates of the batch.
     policy <- policy_of(unique(batch$episodes$candidate))
     new_worker_task(
       "batch", recipe, server_versions(vector_env$client), num_envs = num_envs,
@@ -175,8 +176,8 @@ batch_deadline <- function(slowest) {
 
 # The worker's part ------------------------------------------------------------------------------
 
-# A task arrives in one message and depends on nothing else. A worker keeps its vector environments
-# between tasks, on its own server, which ends with it.
+# A task arrives in one message and depends on nothing else. Between tasks, a worker keeps its
+# vector environments, which are on its own server.
 
 the_worker <- new.env(parent = emptyenv())
 the_worker$kept <- list()
@@ -216,7 +217,7 @@ environment_recipe <- function(env, vector_env, arguments) {
 #' Make a task
 #'
 #' @param kind A kind that [run_task()] has a method for.
-#' @param versions Those of the server.
+#' @param versions The versions of the session's server, see [server_versions()].
 #' @noRd
 new_worker_task <- function(kind, recipe, versions, ...) {
   gym <- as.character(utils::packageVersion("gym"))
@@ -236,15 +237,15 @@ do_task <- function(task) {
     {
       check_worker_version(task$gym, as.character(utils::packageVersion("gym")), "the package gym")
       the_session$environments[names(task$recipe$entry)] <- task$recipe$entry
-      # Where the task's functions look for objects of the session.
+      # The task's functions look for objects of the session in attached packages and globalenv().
       for (package in task$session$packages) {
         suppressPackageStartupMessages(library(package, character.only = TRUE))
       }
       list2env(task$session$objects, globalenv())
-      # As many processes play beside the environment as future gives the worker cores: normally
+      # The worker's server plays with as many processes as future gives the worker cores, normally
       # one.
       the_session$cores <- parallelly::availableCores()[[1L]]
-      # A forked child has its own server, too, which must not outlive it.
+      # A forked child has its own server, which must end with the child.
       if (Sys.getpid() != the_session$pid) {
         parent <- mget(c("pid", "client", "servers"), the_session)
         list2env(list(pid = Sys.getpid(), client = NULL, servers = list()), the_session)
@@ -286,7 +287,7 @@ check_worker_gymnasium <- function(task, client) {
   }
 }
 
-# Does a task by its class. The worker has the right package.
+# Does a task; its class selects the method.
 run_task <- function(task) UseMethod("run_task")
 
 #' @exportS3Method
@@ -327,13 +328,14 @@ forget_kept <- function() {
 
 # Objects of the session ------------------------------------------------------------------
 
-# Functions that go to a worker use objects of the session: a number, another function, a package.
-# Serialized functions leave the global environment behind, so its objects travel beside them.
+# Functions that go to a worker may use objects of the session: a number, another function, a
+# package. Serialization does not include the global environment, so these objects are sent with the
+# function.
 
 #' Find what functions use from the global environment
 #'
 #' @param x Anything that contains functions: a policy, a recipe, the settings of a training.
-#' @return A list: `objects`, a list with names, and `packages`, the names of those to attach.
+#' @return A list: `objects`, a named list, and `packages`, the names of the packages to attach.
 #' @noRd
 session_objects <- function(x, found = list(objects = list(), packages = character())) {
   functions <- session_functions(x)
@@ -349,12 +351,12 @@ session_objects <- function(x, found = list(objects = list(), packages = charact
   objects <- mget(names, globalenv())
   found$packages <- union(found$packages, used$packages)
   found$objects <- c(found$objects, objects)
-  # These may contain functions themselves, such as a list of them.
+  # The objects may be or contain functions themselves.
   if (length(objects)) session_objects(objects, found) else found
 }
 
-# The functions in an object that were written in the session. Those of packages are on the worker,
-# too, but may have been made from functions of the session.
+# The functions in an object that were written in the session. Functions of packages are on the
+# worker, too, but they may enclose functions of the session.
 session_functions <- function(x, seen = rlang::env(list = list())) {
   if (is.function(x)) {
     if (is.primitive(x)) {
@@ -370,7 +372,7 @@ session_functions <- function(x, seen = rlang::env(list = list())) {
       return(NULL)
     }
     seen$list <- c(seen$list, x)
-    # A class of R6 names the one that it inherits from in an expression.
+    # An R6 class has the class that it inherits from as an expression.
     parent <- if (inherits(x, "R6ClassGenerator")) as.function(list(x$inherit), x$parent_env)
     inside <- c(list(parent, parent.env(x)), as.list.environment(x, all.names = TRUE))
     session_functions(inside, seen)

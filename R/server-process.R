@@ -1,22 +1,22 @@
 # The server as a process of this session: its start, its first lines of output, its end.
 
-# Runs the server like `-m gym_server`, but without the working directory in Python's search path: a
-# file random.py there would replace Python's own module.
+# Runs the server like `-m gym_server`, but takes the working directory out of Python's search path:
+# a file random.py there would replace Python's own module.
 run_server <- paste0(
   "import sys; sys.path[:] = [place for place in sys.path if place]; ",
   "import runpy; runpy.run_module('gym_server', run_name='__main__', alter_sys=True)"
 )
 
-# Starts the server with one Python, and with a token, or `NULL` for what its arguments and the
-# environment variable say. Returns a description of the running server, or a string with the reason
-# why this Python cannot run it.
+# Tries to start the server with one Python. Without `token`, the server's arguments and the
+# environment variable determine its token. Returns a description of the running server, or a string
+# that says why this Python cannot run it.
 launch_server <- function(python, arguments, timeout, token = NULL, call = rlang::caller_env()) {
   log <- temporary_file("gym-server-", fileext = ".log")
   use_python(python)
   process <- start_python(
     python, arguments, stdin = "|", stdout = "|", stderr = log, token = token,
-    # processx or a forked child would kill the server. Instead the session closes the server's
-    # standard input; the server then closes its environments and ends.
+    # With `cleanup`, processx or a forked child would kill the server. Instead, the session closes
+    # the server's standard input. The server then closes its environments and ends.
     cleanup = FALSE
   )
   if (is.null(process)) {
@@ -37,8 +37,8 @@ launch_server <- function(python, arguments, timeout, token = NULL, call = rlang
   refusal_reason(lines)
 }
 
-# Starts a Python that can import the server; `NULL` if that fails. Other accounts cannot read the
-# environment variables of a process, but its arguments.
+# Starts a Python that can import the server; `NULL` if that fails. The token is an environment
+# variable, because other accounts can read the arguments of a process.
 start_python <- function(python, arguments, ..., token = NULL) {
   variables <- server_environment()
   if (!is.null(token)) variables[[token_variable]] <- token()
@@ -48,7 +48,8 @@ start_python <- function(python, arguments, ..., token = NULL) {
   ))
 }
 
-# Why a Python could not be started. A bare name is looked for on the PATH.
+# Why a Python could not be started. The system looks for a bare name on the PATH, so no file need
+# exist.
 not_started_reason <- function(python) {
   gone <- basename(python) != python && !file.exists(python)
   if (gone) "there is no such file" else "it cannot be run"
@@ -60,8 +61,8 @@ refusal_reason <- function(lines) {
   sub("^gym_server cannot run on this Python [(].*[)]: ", "", last)
 }
 
-# The start of a line in which the server itself says why it cannot start. Other lines come from a
-# Python that cannot run it, or from a program that only has the name of one.
+# The server itself says why it cannot start in a line that begins like this. Other lines come from
+# a Python that cannot run the server, or from another program with Python's name.
 server_line_start <- "^(gym_server:|gym-http-server: error)"
 
 # Which program has the server's port, if the server ended for that reason.
@@ -85,8 +86,8 @@ server_environment <- function() {
   )
 }
 
-# LD_LIBRARY_PATH without the folders that R put in front. Python would find another Python's
-# libraries there.
+# LD_LIBRARY_PATH without the folders that R put in front, where Python could find libraries of
+# another Python.
 own_library_path <- function() {
   path <- Sys.getenv("LD_LIBRARY_PATH")
   script <- file.path(R.home("etc"), "ldpaths")
@@ -97,15 +98,15 @@ own_library_path <- function() {
     "/bin/sh", c("-c", '. "$0" && printf %s "$LD_LIBRARY_PATH"', script),
     env = c("current", LD_LIBRARY_PATH = "")
   )$stdout
-  # They occur several times if R was started from R.
+  # R that was started from R has them several times.
   while (nzchar(added) && startsWith(path, added)) {
     path <- sub("^:", "", substring(path, nchar(added) + 1L))
   }
   c(LD_LIBRARY_PATH = path)
 }
 
-# Waits for the line by which the server reports that it accepts connections. Returns a list of its
-# address, `url`; NULL if the process ended first.
+# Waits until the server prints that it accepts connections. Returns a list with its address, `url`;
+# NULL if the process ended first.
 await_start <- function(process, log, timeout, call) {
   deadline <- now() + timeout
   lines <- character()
@@ -123,7 +124,7 @@ await_start <- function(process, log, timeout, call) {
     said <- lines[startsWith(lines, "Server starting at: ")]
     if (length(said)) {
       address <- sub("Server starting at: ", "", said[[1L]], fixed = TRUE)
-      # A server that listens on all addresses is also at the loopback address.
+      # A server that listens on all addresses also listens on the loopback address.
       return(list(url = sub("//0.0.0.0:", "//127.0.0.1:", address, fixed = TRUE)))
     }
     if (!process$is_incomplete_output()) {
@@ -137,8 +138,8 @@ log_tail <- function(log, n = 20L) {
   utils::tail(if (file.exists(log)) readLines(log, warn = FALSE) else character(), n)
 }
 
-# Why a process has ended, in words; `NULL` if it was stopped. Its log has a line about that by the
-# server itself, or by Python if the server could not write it. `less` says what takes less memory.
+# Why a process has ended, as text; `NULL` if it was stopped. The server writes the reason into its
+# log, or Python does if the server cannot. `less` advises how to use less memory.
 end_reason <- function(process, log, less = paste(
   "fewer or smaller environments take less, and `gym_server_start(max_memory_mb = )` is the limit."
 )) {
@@ -153,7 +154,7 @@ end_reason <- function(process, log, less = paste(
   } else if (length(python) && startsWith(python[[1L]], "Timeout")) {
     "C code held Python's lock for longer than the server's `max_call_seconds`."
   } else if (any(grepl("^[^ ]* ?terminat.*bad_alloc", lines))) {
-    # C++ prints this and aborts.
+    # C++ prints this when memory runs out, and aborts.
     paste("The system gave it no more memory:", less)
   } else if (length(python)) {
     crash <- c(sub("^Fatal Python error: ", "", python[[1L]]), signal)
@@ -192,8 +193,8 @@ close_server_input <- function(server) {
   try(close(server$process$get_input_connection()), silent = TRUE)
 }
 
-# Stops the server by a signal, because its standard input stays open while a forked child of this
-# session lives. A server paused by SIGSTOP receives SIGTERM when it continues.
+# Stops the server by a signal: while a forked child of this session lives, the server's standard
+# input stays open. A server that was paused by SIGSTOP receives SIGTERM only when it continues.
 terminate_server <- function(server) {
   if (server$process$is_alive() && !is_windows()) {
     server$process$signal(tools::SIGTERM)
@@ -205,11 +206,11 @@ terminate_server <- function(server) {
 
 #' Find out what listens at an address
 #'
-#' No token is sent, because it may be another program.
+#' This sends no token, because the program may not be a Gym server.
 #' @param timeout The time for the answer, in seconds. A server that accepts connections but does
 #'   not answer in time still counts as listening.
-#' @return A list of `listens` and `is_gym` (logical) and `name` (of the program, by its own
-#'   account, a string or `NULL`).
+#' @return A list of `listens` and `is_gym` (logical) and `name` (the name that the program gives
+#'   itself, a string or `NULL`).
 #' @noRd
 probe_server <- function(base, timeout) {
   client <- new_client(base, timeout, httr::config(forbid_reuse = TRUE))
@@ -246,10 +247,11 @@ port_holder <- function(base) {
 
 # Which Python runs the server -------------------------------------------------------------------
 
-# Where to look for it, and the error if there is none.
+# Where to look for a Python, and the error if none can run the server.
 
 #' Say that no Python can run the server
-#' @param refusals Why each tried Python cannot, strings named by its path.
+#' @param refusals Why each tried Python cannot run the server: strings, named by the paths of the
+#'   Pythons.
 #' @noRd
 abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
   named <- named_python(python)
@@ -292,7 +294,7 @@ pip_install_server <- function(python) {
 #' It imports the whole server and prints its version.
 #' @param timeout The time for that, in seconds.
 #' @param before Lines of Python to run first, a string.
-#' @return Why it cannot, a string, or `NULL`.
+#' @return A string that says why it cannot, or `NULL`.
 #' @noRd
 python_problem <- function(python, timeout = 60, before = "") {
   run <- run_quietly(
@@ -323,11 +325,12 @@ python_candidates <- function(python = NULL) {
   folder <- if (is_windows()) c("Scripts", ".") else "bin"
   places <- file.path(rep(active[nzchar(active)], each = length(folder)), folder)
   path <- strsplit(Sys.getenv("PATH"), .Platform$path.sep, fixed = TRUE)[[1L]]
-  # The folder WindowsApps has a program named python that opens the Store.
+  # In the folder WindowsApps, python is a program that only opens the Store.
   path <- grep("WindowsApps", path[nzchar(path)], value = TRUE, invert = TRUE)
   if (lacks_developer_tools()) path <- setdiff(path, "/usr/bin")
   found <- c(pythons_in(places), installed_server()$python, pythons_in(path))
-  # The Python of an environment may be a link to one elsewhere that lacks its packages.
+  # Also compare folders: the Python of an environment may be a link to another Python, which lacks
+  # the environment's packages.
   found[!duplicated(paste(normalizePath(dirname(found)), normalizePath(found)))]
 }
 

@@ -2,8 +2,8 @@
 #'
 #' Look at everything that the package needs: R and its packages, the installed Python environment,
 #' the Pythons on the machine, servers, and environment variables. Print the findings on one screen,
-#' mark problems and name the call that fixes each. This changes nothing, asks nothing, and takes a
-#' few seconds at most. For a bug report you can use it in an R Markdown document.
+#' mark problems, and name the call that fixes each. This changes nothing and asks nothing. Add the
+#' output to a bug report; it also works in an R Markdown document.
 #'
 #' @return Invisibly, the findings: a data frame of class `gym_sitrep` with one row for each finding
 #'   and the columns
@@ -13,8 +13,7 @@
 #'   \item{finding}{What was found, a string.}
 #'   \item{state}{`"ok"`, `"note"` for something that may be intended, or `"wrong"`.}
 #'   \item{fix}{The call that helps, a string, or `NA`.}
-#'   }
-#'   The token and passwords in addresses are left out.
+#'   } The findings contain neither the token nor passwords in addresses.
 #' @seealso [gym_server_install()], [gym_server_log()]
 #' @export
 #' @examples
@@ -63,7 +62,7 @@ sitrep_r <- function() {
                     names(suggested_packages))
   variables <- Sys.getenv()
   variables <- variables[grepl("^GYM_", names(variables)) & nzchar(variables)]
-  # Secrets are left out, because people show the report to others.
+  # Hide secrets, because people show the report to others.
   variables[names(variables) == token_variable] <- "<token>"
   rbind(
     finding("R", "gym", paste0(
@@ -83,8 +82,8 @@ sitrep_r <- function() {
   )
 }
 
-# Measured: updates of PPO with 64 and 256 rows, two hidden layers of 64, took 2.0 and 2.5 times as
-# long with the reference.
+# The basis of "twice as fast": PPO's updates with 64 and 256 rows, and two hidden layers of 64
+# units, took 2.0 and 2.5 times as long with the reference BLAS.
 sitrep_blas <- function(file = extSoftVersion()[["BLAS"]]) {
   if (is_reference_blas(file)) {
     finding("R", "BLAS", paste0(
@@ -111,7 +110,8 @@ sitrep_environment <- function() {
   }
 }
 
-# The first Python that runs the server, after those that cannot. `needed`: whether none is wrong.
+# Lists Pythons up to the first one that runs the server. `needed`: whether it is wrong if there is
+# none.
 sitrep_pythons <- function(needed) {
   rows <- NULL
   for (python in python_candidates()) {
@@ -151,7 +151,7 @@ sitrep_own_servers <- function(named) {
   ))
 }
 
-# Asks one server what it is. Its errors say what is wrong.
+# Asks a server for its versions. An error becomes a finding.
 sitrep_server <- function(url, what, fix) {
   if (!is_server_address(url)) {
     return(finding("servers", what, "is not the address of a server", "wrong", fix))

@@ -19,7 +19,7 @@ space_label.gym_space_multidiscrete <- function(space) {
 #' @exportS3Method
 space_label.gym_space_multibinary <- function(space) paste("MultiBinary", shape_text(space$shape))
 
-# The lower and the upper bound of each element, row by row; also of a Discrete space.
+# The lower and the upper bound of each number, row by row. This also works for a Discrete space.
 space_bounds <- function(space) {
   if (inherits(space, "gym_space_box")) {
     return(list(low = space$low, high = space$high))
@@ -77,9 +77,9 @@ wanted_shape <- function(shape) {
   }
 }
 
-# The shape of an R value. A vector without dim is one-dimensional, with two exceptions: a number is
-# a scalar if the space's shape is that of a scalar; and if a batch has one number for each
-# sub-environment, a vector is a column of it.
+# The shape of an R value. A vector without dim has one dimension, with two exceptions. If values of
+# the space have no dimensions, a single number has none either. If a batch has one number for each
+# sub-environment, a vector counts as a matrix of one column.
 value_shape <- function(value, space) {
   if (!is.null(dim(value))) {
     dim(value)
@@ -93,7 +93,8 @@ value_shape <- function(value, space) {
 }
 
 # Finds the first number that does not belong to the space: a missing one, or one with a fraction if
-# they must be whole. Returns NULL if there is none. NaN is a number, which only the bounds refuse.
+# numbers must be whole. Returns NULL if all are right. NaN is not missing; only a check of the
+# bounds refuses it.
 wrong_number <- function(space, flat) {
   missing <- if (anyNA(flat)) is.na(flat) & !is.nan(flat)
   if (any(missing)) {
@@ -123,10 +124,10 @@ out_of_bounds <- function(space, flat) {
   }
 }
 
-#' Allow the numbers of a space to be outside of their bounds by a rounding
+#' Allow the numbers of a space to exceed their bounds by a rounding error
 #'
-#' An observation is computed, often from numbers of another dtype: float32 has seven digits.
-#' [space_contains()], whose answer is Gymnasium's, allows none.
+#' Observations are computed, often from numbers of another dtype: float32 has only seven digits.
+#' [space_contains()] does not use this, so that it agrees with Gymnasium.
 #' @noRd
 allow_rounding <- function(space) {
   if (inherits(space, "gym_space_box") && !space$dtype %in% c(integer_dtypes, "bool")) {
@@ -192,7 +193,7 @@ draw_numbers <- function(dtype, low, high) {
 }
 
 draw_whole <- function(low, high) {
-  # Of an int64 only those that R can represent.
+  # For int64, draw only numbers that R can represent exactly.
   low <- pmax(low, pmin(1 - 2^53, high))
   high <- pmin(high, pmax(2^53 - 1, low))
   width <- high - low
@@ -250,7 +251,7 @@ check_value.gym_space_discrete <- function(space, value, path, call, bounds = FA
   }
 }
 
-# Called in nearly every step: the usual case, the last one, is fast.
+# Nearly every step calls this, so it must be fast.
 is_whole <- function(value) {
   length(value) == 1L && is.numeric(value) && !is.object(value) && is.finite(value) &&
     value == trunc(value)

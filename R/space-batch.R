@@ -1,12 +1,13 @@
-# Batches, the spaces of several values of a space: one for each sub-environment of a vector
-# environment, or for each element of a Sequence or Graph. Numbers are stacked into one array, whose
-# first dimension is the sub-environment. Tuple and Dict are stacked part by part. Texts are a
-# character vector. Values without a fixed form are a list.
+# A batch has several values of a space: one for each sub-environment of a vector environment, or
+# for each element of a Sequence or Graph. This file has the spaces of batches, and functions for
+# their values. Numbers are stacked into one array, whose first dimension is the sub-environment.
+# Tuple and Dict are stacked part by part. Texts are a character vector. Values without a fixed form
+# are a list.
 
 #' Make the space of several values of a space
 #'
 #' Like Gymnasium's `batch_space()`, but a MultiDiscrete or MultiBinary space keeps its kind, with
-#' one dimension more. The bounds are those of one value, which R recycles in row-major order;
+#' one dimension more. The batch has the bounds of one value, which R recycles in row-major order;
 #' [spread_bounds()] repeats them for each value.
 #' @param n The number of values.
 #' @noRd
@@ -71,7 +72,7 @@ check_value.gym_space_discretes <- function(space, value, path, call, bounds = F
   if (!quick) check_value.gym_space_array(space, value, path, call, bounds)
 }
 
-# Whole numbers as R's integers, `NULL` if they do not fit or if there is anything else.
+# Converts whole numbers to R's integers. `NULL` if a number does not fit or is not whole.
 small_integers <- function(x) {
   if (is.object(x)) {
     NULL
@@ -130,8 +131,8 @@ to_tensors.gym_space_texts <- function(space, value, name, call, path = "") {
 
 #' Check a value for each sub-environment
 #'
-#' All are checked together, because they usually fit. If they do not, they are checked one by one,
-#' so that the error names the sub-environment and shows its value.
+#' Values usually fit, so this first checks all together. If one does not fit, it checks them one by
+#' one, so that the error names the sub-environment and shows its value.
 #' @param space The space of one sub-environment.
 #' @param batch The space of all `n`.
 #' @param sub_envs Their numbers; `NULL` for 1 to `n`.
@@ -146,7 +147,7 @@ check_batch <- function(space, batch, values, n, call, sub_envs = NULL, bounds =
     problem <- paste0("One value for each of the sub-environments is needed: ", n, ", not ", given)
     abort_space(batch, values, problem, call)
   }
-  # A number taken from an integer64 loses the class.
+  # Selecting a number of an integer64 drops the class, so check such a batch only as a whole.
   if (!is.na(given) && !is_integer64(values)) {
     for (i in seq_len(n)) {
       tryCatch(
@@ -202,7 +203,7 @@ batch_length.gym_space_tuple <- function(space, values) {
 #' @exportS3Method
 batch_length.gym_space_dict <- batch_length.gym_space_tuple
 
-# JSON has the values of one sub-environment after the other, for any space.
+# In JSON, a batch is an array with the value of each sub-environment, for any space.
 write_batch <- function(space, values, n) {
   sub_envs <- lapply(seq_len(n), function(sub_env) batch_value(space, values, sub_env))
   json_array(vapply(sub_envs, write_value, "", space = space))
@@ -210,8 +211,7 @@ write_batch <- function(space, values, n) {
 
 # Putting batches together and taking them apart -------------------------------------------------
 
-# Numbers are an array whose first dimension is the sub-environment (a vector for single numbers),
-# texts a character vector, values of Tuple and Dict a list of such parts, other values a list.
+# A batch of single numbers is a vector. See the top of this file for the other forms.
 
 has_parts <- function(space) {
   inherits(space, "gym_space_tuple") || inherits(space, "gym_space_dict")
@@ -259,7 +259,7 @@ batch_value <- function(space, batch, i) {
 }
 
 #' Take some values of a batch as a smaller batch
-#' @param i Their numbers, with or without repetition.
+#' @param i The numbers of the values, with or without repetition.
 #' @noRd
 batch_rows <- function(space, batch, i) {
   if (has_parts(space)) {
@@ -283,7 +283,8 @@ rows_of <- function(x, i) {
   }
 }
 
-# The parts in the order of the space: a policy may return those of a Dict in any order.
+# Sorts parts in the order of the space, because a policy may return the parts of a Dict in any
+# order.
 in_order <- function(space, parts) {
   keys <- names(space$spaces)
   if (is.null(keys) || is.null(names(parts))) parts else parts[match(keys, enc2utf8(names(parts)))]
@@ -315,8 +316,8 @@ bind_batches <- function(space, each) {
 
 #' Replace some values of a batch
 #' @param n The number of values in the batch.
-#' @param i The numbers of those to replace.
-#' @param values The batch of their replacements.
+#' @param i The numbers of the values to replace.
+#' @param values A batch of the new values.
 #' @noRd
 replace_rows <- function(space, batch, n, i, values) {
   if (!is_stackable(space) || is.object(batch) || is.object(values)) {
@@ -364,7 +365,7 @@ number_rows <- function(batch) {
   }
 }
 
-# Accepts what is almost a batch, such as a vector for a matrix of one column.
+# Converts what is almost a batch to a batch, such as a vector to a matrix of one column.
 as_batch <- function(space, actions) {
   if (has_parts(space)) {
     complete <- is.list(actions) && length(actions) == length(space$spaces)

@@ -1,5 +1,5 @@
-# Spaces made in R: the constructors check their arguments and write the description that the server
-# would send, so that new_space() makes the same objects from both.
+# Spaces made in R. The constructors check their arguments and make the same objects as new_space()
+# makes from a server's description.
 
 #' Make a space
 #'
@@ -16,20 +16,20 @@
 #' * `space_tuple()`, `space_dict()`: a value of each of several spaces, without and with names.
 #'
 #' @param low,high The bounds of the numbers of a Box, both included. A single number applies to all
-#'   numbers of the Box. Otherwise each number has its own bound: a vector, or an array if the shape
+#'   numbers of the Box. To give each number its own bound, use a vector, or an array if the shape
 #'   has two dimensions or more. Use `-Inf` and `Inf` for no bound. The names of `low` (or of
 #'   `high`, if `low` has none) are the names of the numbers: policies get them as column names of
 #'   the observations, as in `observation[, "position"]`.
 #' @param shape The size of each dimension: a vector of whole numbers, `integer()` for a single
 #'   number without dimensions. For a Box the default, `NULL`, uses the shape of the bounds: one
 #'   number if both are single numbers.
-#' @param dtype The type of the numbers, a string. The default, `"float64"`, is R's own. `"float32"`
-#'   and `"float16"` are less precise, and the bounds are rounded to them; Gymnasium's own default
-#'   is `"float32"`. The others are `"int8"` to `"int64"`, `"uint8"` to `"uint64"`, for whole
+#' @param dtype The type of the numbers, a string. The default, `"float64"`, is R's own.
+#'   `"float32"`, Gymnasium's own default, and `"float16"` are less precise, and bounds are rounded
+#'   to that precision. The others are `"int8"` to `"int64"`, `"uint8"` to `"uint64"`, for whole
 #'   numbers, and `"bool"`, for `TRUE` and `FALSE`.
 #' @param n The number of values, a whole number of at least 1.
-#' @param start The first value, a whole number. For `space_multi_discrete()` a single one for all
-#'   numbers, or one for each, in the shape of `nvec`.
+#' @param start The first value, a whole number. For `space_multi_discrete()`, a single number for
+#'   all, or an own one for each, in the shape of `nvec`.
 #' @param nvec The number of values of each number, a vector or an array of whole numbers of at
 #'   least 1.
 #' @param max_length,min_length The largest and smallest number of characters in a text.
@@ -38,8 +38,8 @@
 #'   the digits.
 #' @param ... Spaces: without names for `space_tuple()`, with different names for `space_dict()`.
 #' @return An object of class `gym_space`, a list with the elements that [space_sample()] lists for
-#'   its kind. A Box whose bounds have names also has the element `names`, and so has a
-#'   MultiDiscrete space with the names of `nvec`.
+#'   its kind. A Box whose bounds have names also has an element `names`. So does a MultiDiscrete
+#'   space if `nvec` has names.
 #' @section Errors: `gym_error_argument`, which names the argument and the value.
 #' @export
 #' @examples
@@ -175,7 +175,7 @@ spread_bound <- function(x, shape, dtype, arg = rlang::caller_arg(x), call = rla
   round_to_dtype(as.double(row_major(x)), dtype)
 }
 
-# The names of the numbers of a space, which its first argument or its second has.
+# The names of the numbers of a space: those of its first argument or, without these, of its second.
 names_of_numbers <- function(x, y, shape, x_arg = rlang::caller_arg(x),
                              y_arg = rlang::caller_arg(y), call = rlang::caller_env()) {
   names <- names(x) %||% names(y)

@@ -1,11 +1,12 @@
-# The values of a space numbered 1, 2, ..., for tables with a row for each: a Discrete space, and
-# combinations of several.
+# Numbers the values of a space 1, 2, ..., for tables with a row for each value. This works for a
+# Discrete space, and for spaces that combine several.
 
 #' Number the values of a space
 #'
-#' @return A list: `count`, a number; `index`, a function of a batch of values and their number that
-#'   returns their numbers, from 1, and `NA` for a value outside the space; and `value`, a function
-#'   of such numbers that returns a batch of the values. `NULL` if the values cannot be counted.
+#' @return A list: `count`, how many values the space has; `index`, a function of a batch and the
+#'   count of its values, which returns the number of each value, from 1, and `NA` for a value
+#'   outside the space; and `value`, a function of such numbers, which returns a batch of the
+#'   values. `NULL` if the values cannot be counted.
 #' @noRd
 space_index <- function(space) UseMethod("space_index")
 
@@ -23,7 +24,7 @@ space_index.gym_space_discrete <- function(space) {
   )
 }
 
-# The distance of whole numbers from the first of `n`; NA for others.
+# How far numbers are from the first of `n` consecutive whole numbers; NA for any other number.
 beyond_start <- function(x, start, n) {
   beyond <- if (is.numeric(x) || is.logical(x)) x - start else rep(NA, length(x))
   beyond[is.na(beyond) | beyond < 0 | beyond >= n | beyond != trunc(beyond)] <- NA
@@ -40,7 +41,7 @@ space_index.gym_space_multibinary <- function(space) {
   digits_index(rep(2, prod(space$shape)), 0, space$shape)
 }
 
-# Numbers of several digits, of which the last one changes first, as in Gymnasium's own arrays.
+# The value is a number of several digits. The last digit changes first, as in NumPy's arrays.
 digits_index <- function(nvec, start, shape) {
   rank <- length(shape)
   weights <- rev(cumprod(c(1, rev(nvec))))[-1L]
@@ -50,7 +51,7 @@ digits_index <- function(nvec, start, shape) {
       if (length(batch) != n * length(nvec)) {
         return(rep(NA_integer_, n))
       }
-      # Row by row, as `nvec` is.
+      # `nvec` is row by row, so sort the batch in the same way.
       if (rank > 1L) batch <- aperm(batch, c(1L, rev(seq_len(rank)) + 1L))
       first <- rep(start, each = if (length(start) > 1L) n else 1L)
       digits <- beyond_start(as.vector(batch), first, rep(nvec, each = n))
@@ -112,9 +113,9 @@ rows_of_table <- function(index, space, observation, n, call) {
 state_numbers <- function(space) seq.int(as.integer(space$start), length.out = as.integer(space$n))
 
 #' List all values of a countable space
-#' @return A data frame with a row for each, in the order of its numbers, and a column for each
-#'   number of a value, named by its part: `state` for a Discrete space, or the columns of its
-#'   names.
+#' @return A data frame with a row for each value, in the order of [space_index()], and a column for
+#'   each number of a value. The columns have the names of the parts; a Discrete space has one
+#'   column, `state`.
 #' @noRd
 all_values <- function(space) {
   if (!is.null(space$values)) {
@@ -126,11 +127,11 @@ all_values <- function(space) {
   } else {
     space$names %||% names(space$spaces) %||% part_columns("obs", seq_along(columns))
   }
-  # The last one changes first.
+  # The last column changes first, as in digits_index().
   rev(do.call(expand.grid, c(rev(columns), KEEP.OUT.ATTRS = FALSE)))
 }
 
-# The possible values of each number of a value, a list.
+# A list with the possible values of each number of a value.
 digit_values <- function(space) {
   if (inherits(space, "gym_space_discrete")) {
     list(state_numbers(space))
@@ -145,8 +146,8 @@ digit_values <- function(space) {
   }
 }
 
-# The Discrete space of the numbers of actions of several parts, which have the columns of the table
-# of steps as names; NULL if they cannot be counted.
+# Numbers the actions of a space with several parts. Returns a Discrete space, whose labels have the
+# columns of a table of steps; NULL if the actions cannot be counted.
 countable_actions <- function(space) {
   index <- if (!is.null(space)) space_index(space)
   if (is.null(index)) {

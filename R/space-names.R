@@ -1,11 +1,10 @@
-# The names of observations. A space may have an element `names`: for an array of one dimension the
-# names of its numbers, for a Tuple those of its parts, for a Discrete space the name of its number
-# in tables. Values get their names after reading; code that reads and writes them does not need
-# names.
+# The names of observations. A space may have an element `names`: the names of the numbers of an
+# array with one dimension, of the parts of a Tuple, or of the column of a Discrete space in tables.
+# Values get names after reading, so the code that reads and writes values ignores names.
 
 #' Make the function that adds names to values of a space
 #'
-#' It is made once for an environment, so that each step only sets an attribute.
+#' An environment makes it once, so that each step only sets an attribute.
 #' @param space The space of one value.
 #' @param batch Whether the function is for batches of values.
 #' @return A function of a value, which returns it with names; `NULL` if values have none.
@@ -24,7 +23,7 @@ naming <- function(space, batch = FALSE) {
       }
     }
   } else if (is.null(labels) || !inherits(space, "gym_space_array")) {
-    # A single number has none: it would be printed with its name at each step.
+    # A single number gets no name, because R would print the name at each step.
     NULL
   } else if (batch) {
     labels <- list(NULL, labels)
@@ -40,7 +39,7 @@ naming <- function(space, batch = FALSE) {
   }
 }
 
-# A batch with the names that it has in play.
+# Gives a batch the names that it has during play.
 named_batch <- function(space, batch) {
   name <- naming(space, batch = TRUE)
   if (is.null(name)) batch else name(batch)
@@ -50,8 +49,9 @@ named_batch <- function(space, batch) {
 
 #' Put observations into columns
 #'
-#' The columns of the table of steps, which models are fitted to. They have the names of the space,
-#' or otherwise `obs_1`, `obs_2`, ..., with the keys of a Dict such as `obs_position_1`.
+#' Tables of steps have these columns, and users fit models to them. Their names are those of the
+#' space, or otherwise `obs_1`, `obs_2`, ...; with the keys of a Dict, names such as
+#' `obs_position_1`.
 #' @param values Many observations, as returned by [batch_of()].
 #' @return A named list of columns.
 #' @noRd
@@ -75,7 +75,7 @@ number_names <- function(space, n = prod(space$shape)) {
   if (is.null(space$names)) part_columns("obs", seq_len(n)) else beside_steps(space$names)
 }
 
-# A name that another column of the table of steps has, or may have, gets the prefix `obs_`.
+# Adds the prefix `obs_` to a name that another column of the table of steps has, or may have.
 beside_steps <- function(names) {
   taken <- names %in% c("candidate", "episode", "step", "reward", "terminated", "truncated") |
     grepl("^(action|next|obs)(_|$)", names)
@@ -86,8 +86,8 @@ part_columns <- function(name, parts) paste0(name, "_", parts, recycle0 = TRUE)
 
 #' Put values of a space into columns
 #'
-#' Numbers have a column each, in row-major order; so have the parts of Tuple and Dict. Values with
-#' a variable number of parts have one column that is a list.
+#' Each number of a value has its own column, in row-major order, also in the parts of Tuple and
+#' Dict. Values with a variable number of parts have one column, a list.
 #' @param values The values, as returned by [batch_of()].
 #' @param name Their name, such as `"action"`.
 #' @return A named list of columns.
@@ -101,7 +101,7 @@ value_columns.default <- function(space, values, name) stats::setNames(list(I(va
 value_columns.gym_space_array <- function(space, values, name) {
   numbers <- number_rows(values)
   n <- ncol(numbers)
-  # In a matrix of one row with named columns the number would keep its name.
+  # unname(), because a number of a matrix with one row keeps the name of its column.
   each <- lapply(seq_len(n), function(i) unname(numbers[, i]))
   parts <- space$names %||% if (n > 1L) seq_len(n)
   stats::setNames(each, if (n == 1L && is.null(parts)) name else part_columns(name, parts))
@@ -126,13 +126,13 @@ value_columns.gym_space_tuple <- function(space, values, name) {
 #' @exportS3Method
 value_columns.gym_space_dict <- value_columns.gym_space_tuple
 
-# The column of the action is `action`, those of its parts start with `action_`.
+# Renames columns as actions: a single column becomes `action`, several get the prefix `action_`.
 named_as_actions <- function(columns) {
   parts <- part_columns("action", sub("^action_", "", names(columns)))
   stats::setNames(columns, if (length(columns) == 1L) "action" else parts)
 }
 
-# The names of these columns; those of a state have columns of the next state, too.
+# The names of the columns of actions. A column with a partner `next_...` belongs to the state.
 columns_of_action <- function(columns) {
   parts <- grep("^action_", columns, value = TRUE)
   parts <- parts[!paste0("next_", parts) %in% columns]
@@ -142,8 +142,8 @@ columns_of_action <- function(columns) {
 # Labels ----------------------------------------------------------------------------------
 
 # A Discrete space may have an element `values`: a data frame with a row for each of its numbers,
-# the name of a state (in several columns, perhaps) or of an action. Numbers play; people see the
-# names.
+# which names a state or an action, in one column or several. Code that plays uses the numbers;
+# users see the names.
 
 #' Make a Discrete space whose numbers stand for values
 #' @param values A data frame with a row for each value.
@@ -164,14 +164,14 @@ row_texts <- function(rows, sep = ", ") {
   do.call(paste, c(unname(lapply(rows, as.character)), sep = sep))
 }
 
-# The values of these numbers: a data frame of the columns of states, or of actions.
+# The names of these numbers: a data frame with the columns of states or actions.
 decoded_values <- function(space, numbers) {
   values <- space$values[numbers - space$start + 1L, , drop = FALSE]
   row.names(values) <- NULL
   values
 }
 
-# The same, as a vector if there is one column. Without names they are the numbers.
+# Like decoded_values(), but one column becomes a vector. Returns the numbers if they have no names.
 named_numbers <- function(space, numbers) {
   if (is.null(space$values)) {
     return(numbers)
@@ -180,12 +180,12 @@ named_numbers <- function(space, numbers) {
   if (length(values) == 1L) values[[1L]] else values
 }
 
-# The same as columns of a table.
+# Actions as columns of a table.
 decoded_actions <- function(space, numbers) {
   data.frame(value_columns(space, numbers, "action"), check.names = FALSE)
 }
 
-#' Return the numbers of some values
+#' Find the numbers of named values
 #' @param x A vector of values or their labels, or a data frame with the columns of the values.
 #' @param what What they are, for the error, such as `"state"`.
 #' @noRd

@@ -1,5 +1,5 @@
-# Functions that write actions and check batches, prepared once and called in every step. They
-# handle the usual values. All others go to check_value(), which finds what is wrong with them.
+# Functions that write actions and check batches. They are prepared once, called in every step, and
+# handle the usual values. All other values go to check_value(), which finds what is wrong.
 
 is_float <- function(space) startsWith(space$dtype %||% "", "float")
 
@@ -7,7 +7,7 @@ is_float <- function(space) startsWith(space$dtype %||% "", "float")
 #'
 #' @param space The space of one action.
 #' @param n The number of actions, `NULL` for one action.
-#' @return A function of an action or a batch, which returns a raw vector, or `NULL` for one that
+#' @return A function of an action or a batch. It returns a raw vector, or `NULL` for a value that
 #'   [check_value()] or [check_batch()] must handle.
 #' @noRd
 array_writer <- function(space, n) UseMethod("array_writer")
@@ -50,7 +50,7 @@ array_writer.gym_space_box <- function(space, n) {
 # The largest float32. Larger numbers are refused.
 float_limits <- c(float32 = 3.4028234e38, float64 = .Machine$double.xmax)
 
-# The bytes of each action are prepared, if there are at most so many.
+# If there are at most this many actions, the bytes of each are prepared.
 most_prepared <- 1024
 
 discrete_writer <- function(space) {
@@ -141,7 +141,7 @@ has_batch_shape <- function(values, n, shape) {
   }
 }
 
-# Comparing with one number for all, if possible, is much faster.
+# If all bounds are the same, comparing with one number is much faster.
 quick_bounds <- function(space) {
   each <- prod(space$shape)
   bounds <- lapply(allowed_bounds(space), function(bound) {

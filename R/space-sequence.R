@@ -1,6 +1,6 @@
-# Sequence: any number of elements of another space. The functions for several elements, which Graph
-# also uses, stack elements that are numbers into one array, like the values of sub-environments.
-# Other elements are a list.
+# Sequence: any number of elements of another space. If the elements are numbers, they are stacked
+# into one array, like the values of sub-environments. Other elements are a list. Graph uses the
+# same functions.
 
 is_stackable <- function(space) {
   inherits(space, "gym_space_array") || inherits(space, "gym_space_discrete")

@@ -1,5 +1,5 @@
-# Values of spaces as tensors. Large values are sent as tensors: the time to parse JSON grows with
-# the number of numbers, the time to read raw bytes hardly does.
+# Values of spaces as tensors. Large values are sent as tensors, because parsing JSON takes longer
+# the more numbers there are; reading raw bytes takes hardly longer.
 
 # Milliseconds for a whole step with JSON and with tensors, by the number of numbers in the
 # observation (R 4.2, waitress, two noisy cores; medians of 300, of 30 from 5,000 on):
@@ -19,7 +19,7 @@ tensors_pay_from <- 200
 # Whether tensors can hold the values: all values of the space must have the same shape.
 has_tensors <- function(space) !is.na(count_numbers(space))
 
-# How many numbers the tensors of a value have, `NA` if they cannot hold it.
+# How many numbers the tensors of a value have; `NA` if tensors cannot hold such values.
 count_numbers <- function(space) {
   if (inherits(space, "gym_space_array")) {
     prod(space$shape)
@@ -34,7 +34,7 @@ count_numbers <- function(space) {
   }
 }
 
-# The names of the tensors of parts: JSON pointers below the name of the whole.
+# The names of the tensors of parts: the name of the whole, followed by a JSON pointer.
 part_names <- function(space, name) {
   keys <- names(space$spaces) %||% (seq_along(space$spaces) - 1L)
   keys <- gsub("/", "~1", gsub("~", "~0", keys, fixed = TRUE), fixed = TRUE)
