@@ -20,7 +20,7 @@
 #'   environment and closes it.
 #' @param ... Arguments of the environment, by name, if it is given by its id.
 #' @param max_steps The number of steps after which an episode counts as endless, a whole number.
-#'   The default is 1000, or the environment's own limit if that is higher.
+#'   The default is 1000. If the environment's own limit is higher, the check uses that limit.
 #' @param seed The first seed, a whole number from 0 to 2^53.
 #' @param client The client of the server that makes an environment of Gymnasium.
 #' @return An object of class `gym_check`, which prints the findings. It is a data frame with a row
@@ -66,7 +66,8 @@ check_env <- function(env, ..., max_steps = 1000, seed = 1, client = gym_client(
   )
   if (check$in_r) {
     check$env <- without_checks(env)
-    # The next user must reset the environment first, as after its creation.
+    # The check leaves the environment in the middle of an episode: require a reset before the next
+    # step.
     sub_env <- sub_env_of(env)
     on.exit(sub_env$taken <- NA_integer_, add = TRUE)
   }

@@ -1,4 +1,4 @@
-# What a client does with, and knows about, the environments on a server.
+# Creates and closes environments on a server, and keeps what a client knows about them.
 
 create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers, num_envs = NULL,
                             vectorization_mode = NULL, autoreset_mode = NULL, name = NULL,

@@ -9,8 +9,7 @@
 #' always makes the same environment. Draw values that should differ between episodes in `reset`.
 #'
 #' @param id The id, a string of letters, digits and `_.:/-`, such as `"Corridor-v0"`.
-#' @param entry_point What makes the environment: an environment of [gym_env()], or a function that
-#'   returns one.
+#' @param entry_point An environment of [gym_env()], or a function that returns an environment.
 #' @param ... Arguments for `entry_point`, by name, which [gym_make()] and [rollout()] can override.
 #'   For an environment of [gym_env()], they replace values with which each `self` starts.
 #' @param max_episode_steps The number of steps after which an episode is cut off, a whole number.

@@ -299,8 +299,8 @@ watcher_timeout <- 5
 #' @section Files: A monitor has its own directory, with the table, `episodes.csv`, and videos named
 #'   by the number of their episode, such as `rl-video-episode-0.mp4`. If another monitor already
 #'   writes in `directory`, of this or another server, the new monitor uses a directory below it,
-#'   named by the `instance_id`, such as `1a2b3c4d`. `list.files(directory, "^episodes[.]csv$",
-#'   recursive = TRUE)` finds all tables.
+#'   named by the `instance_id`, such as `1a2b3c4d`.
+#'   `list.files(directory, "^episodes[.]csv$", recursive = TRUE)` finds all tables.
 #' @inheritParams env_reset
 #' @param directory The directory for the server's files, a string: a path below the server's
 #'   directory for monitors (its option `--monitor-dir`), or, for a server on this machine, below

@@ -4,8 +4,8 @@
 #' [search_random()] makes it, for example to limit the steps, scale the actions or shrink the
 #' pictures. Three wrappers call an R function, for example one that shapes rewards. Use the pipe to
 #' add several: the first is the innermost. The spaces in R are those of the wrapped environment. A
-#' `"TimeLimit"` can only lower the environment's own step limit; `gym_make("MountainCar-v0",
-#' max_episode_steps = 1000)` raises it.
+#' `"TimeLimit"` can only lower the environment's own step limit;
+#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
 #' # R functions
 #'
@@ -55,8 +55,8 @@
 #'   `gym_error_wrapper` if `func` raises an error (with that error's classes) or returns an invalid
 #'   value.
 #' @section Warnings: `gym_warning_wrapper` if `func` returns another value for a row alone than for
-#'   the same row among others, for example because of `observation[1]` instead of `observation[,
-#'   1]`.
+#'   the same row among others, for example because of `observation[1]` instead of
+#'   `observation[, 1]`.
 #' @export
 #' @examples
 #' wrapped <- "CartPole-v1" |>

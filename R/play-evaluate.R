@@ -141,8 +141,8 @@ evaluation_columns <- c("candidate", "mean_return", "se", "lower", "upper", "epi
 #' @return A function of class `gym_objective`. Its argument `weights` is a numeric vector in the
 #'   order of [coef()][coef.gym_policy_network], or a matrix with the weights of a candidate in each
 #'   row; candidates are played together. It returns minus the mean return of each candidate, a
-#'   numeric vector. Its attribute `policy` is the policy, bound to the environment: `coef(attr(f,
-#'   "policy"))` gives weights to start with.
+#'   numeric vector. Its attribute `policy` is the policy, bound to the environment:
+#'   `coef(attr(f, "policy"))` gives weights to start with.
 #' @section Errors: As for [rollout()]. The function raises a `gym_error_argument` for a wrong
 #'   number of weights.
 #' @seealso [train_agent()], [evaluate_policy()]

@@ -47,8 +47,8 @@
 #' @param max_steps The number of steps after which an episode is cut off, a whole number of at
 #'   least 1. Such an episode counts as truncated. `NULL`, the default, uses only the environment's
 #'   own limit. If the environment has none, a policy that never fails plays forever. `max_steps`
-#'   cannot raise the environment's own limit; `gym_make("MountainCar-v0", max_episode_steps =
-#'   1000)` changes that limit.
+#'   cannot raise the environment's own limit;
+#'   `gym_make("MountainCar-v0", max_episode_steps = 1000)` changes that limit.
 #' @param seed A whole number of at most 2^53 that fixes all random numbers, for any [RNGkind()] of
 #'   the session. The session's generator does not change. `NULL`, the default, draws a seed from
 #'   the session's generator.
@@ -64,8 +64,8 @@
 #'   its id. If the server plays whole episodes, this number changes nothing except the column
 #'   `sub_env`. `NULL`, the default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step, in columns whose names begin with
-#'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`, which requires `steps =
-#'   TRUE`. At the end of an episode it is the last observation of that episode.
+#'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`, which requires
+#'   `steps = TRUE`. At the end of an episode it is the last observation of that episode.
 #' @param progress Show a progress bar? By default in interactive sessions only.
 #' @param num_workers The number of the server's processes that run the sub-environments if R plays
 #'   step by step, a whole number; 0 for the server's own process. The result does not depend on it.
