@@ -148,7 +148,7 @@ query_text <- function(data) {
 #' gym_server_stop(server)
 parse_server_error_or_raise_for_status <- function(response) {
   if (!inherits(response, "response")) {
-    abort_argument(response, "an answer of httr's", "response", rlang::current_env())
+    abort_argument(response, "a response of httr", "response", rlang::current_env())
   }
   answer <- read_answer(response, response$request$method %||% "Request to")
   if (is.null(answer)) invisible() else answer

@@ -51,7 +51,7 @@ create_instance <- function(client, env_id, seed, render_mode, kwargs, wrappers,
     gym_abort(
       c(paste0("The server at ", client$remote_base, " is an old one, such as that of ",
                "gym-http-api: it does not describe its environments."),
-        i = "`gym_server_start()` starts this package's server, which the same calls play on."),
+        i = "`gym_server_start()` starts this package's server, which has the same calls."),
       class = "gym_error_http", code = "not_supported", call = call
     )
   }

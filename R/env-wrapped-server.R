@@ -4,10 +4,10 @@
 wrap_server_env <- function(env, wrapper, arguments, call) {
   if (!wrapper %in% names(transforms)) {
     abort_wrong("wrapper", wrapper, call,
-                "Wrappers such as {wrapper} are applied by the server when it makes the
-                 environment, and this one is made.",
-                i = "`gym_make(gym_wrap(\"{env$spec$id}\", \"{wrapper}\"))` makes one; around one
-                     that is made go {toString(names(transforms))}.")
+                "The server applies {wrapper} when it makes an environment, but this one exists
+                 already.",
+                i = "`gym_make(gym_wrap(\"{env$spec$id}\", \"{wrapper}\"))` makes a wrapped one.",
+                i = "An existing one can be wrapped by {toString(names(transforms))}.")
   }
   traits <- new_traits(env$single_observation_space, env$single_action_space, env$spec$id)
   traits$spec <- env$spec
@@ -107,7 +107,7 @@ split_wrappers <- function(wrappers, call) {
   if (length(late)) {
     names <- c(wrappers[[late[[1L]]]][[1L]], wrappers[[which(in_r)[[1L]]]][[1L]])
     abort_wrong("wrapper", names[[1L]], call,
-                "{names[[1L]]} is applied on the server, inside of {names[[2L]]}, which is applied
+                "{names[[1L]]} runs on the server, so it must be inside {names[[2L]]}, which runs
                  in R.",
                 i = "Write it before {names[[2L]]}.")
   }

@@ -128,7 +128,7 @@ connection_hint <- function(base, reason) {
   }
   place <- local_place(base)
   if (is.null(place)) {
-    "Is that its address, and is it running there?"
+    "Is the address right, and is a server running there?"
   } else {
     paste0("Is a server running there? `", start_call(place), "` starts one.")
   }

@@ -86,7 +86,7 @@ check_not_restarted <- function(url, call) {
     base <- entry$client$remote_base
     gym_abort(
       c(
-        paste0("The server at ", base, " has ended, and was started anew."),
+        paste0("The server at ", base, " has ended and was started again."),
         i = paste0("Lost with it: ", environments_on(base, entry$server), "."),
         i = "Make them again with `gym_make()`."
       ),

@@ -19,7 +19,7 @@ find_uv <- function(call = rlang::caller_env(), timeout = 30) {
     abort_wrong(NULL, named, call, class = "gym_error_install",
                 "The variable GYM_UV names {named}, which is not a usable uv.",
                 i = "It must be the path of uv {least_uv} or newer.",
-                i = "After `Sys.unsetenv(\"GYM_UV\")` another one is looked for.")
+                i = "`Sys.unsetenv(\"GYM_UV\")` lets R look for another one.")
   }
   uv
 }
@@ -197,7 +197,7 @@ abort_uv <- function(what, output, call, more = NULL) {
     c(
       paste0(what, "."), x = if (length(shown)) paste(shown, collapse = "\n"),
       install_advice(output$text), more,
-      i = "What was downloaded is kept; `gym_server_install()` continues from here."
+      i = "Downloaded files are kept; `gym_server_install()` continues from here."
     ),
     class = "gym_error_install", output = lines, call = call
   )

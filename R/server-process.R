@@ -264,7 +264,8 @@ abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
       paste0("The Python that ", by, " names cannot run the server."),
       x = paste0(named, ": ", refusals),
       i = if (any(grepl("No module named", refusals, fixed = TRUE))) {
-        paste("What it lacks, in a terminal:", pip_install_server(quote_for_terminal(named)))
+        paste("To install what it lacks, run in a terminal:",
+              pip_install_server(quote_for_terminal(named)))
       },
       i = paste0("Without ", by, unset, " the session uses the one that ",
                  "`gym::gym_server_install()` installs.")
@@ -277,7 +278,7 @@ abort_no_python <- function(python, refusals, call = rlang::caller_env()) {
     c("The server needs a Python of its own, which is not installed yet.",
       i = "`gym::gym_server_install()` installs it.",
       i = if (!rlang::is_interactive()) {
-        "With the environment variable GYM_INSTALL=1 a script does so by itself."
+        "With the environment variable GYM_INSTALL=1, a script installs it by itself."
       })
   }
   gym_abort(message, class = "gym_error_server_start", refusals = refusals, call = call)

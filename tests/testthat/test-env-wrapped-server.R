@@ -105,7 +105,7 @@ test_that("an environment that was made is wrapped, and remains the same instanc
 test_that("a wrapper of the server's over one in R is refused, and so are calls that know none", {
   client <- test_client()
   wrapped <- gym_wrap("CartPole-v1", "TransformReward", func = function(r) r)
-  late <- "TimeLimit is applied on the server, inside of TransformReward"
+  late <- "TimeLimit runs on the server, so it must be inside TransformReward"
   expect_error(gym_wrap(wrapped, "TimeLimit", max_episode_steps = 3), late,
                class = "gym_error_argument")
   expect_error(gym_make(wrapped, wrappers = list(list("TimeLimit", max_episode_steps = 3))), late)

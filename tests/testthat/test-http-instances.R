@@ -187,7 +187,7 @@ test_that("a server that the front started anew is said to have lost the session
     function() env$step(1), function() env$render(), function() env_reset(anna, ids[[1]])
   )
   for (call in calls) {
-    cnd <- expect_error(call(), "was started anew", class = "gym_error_connection")
+    cnd <- expect_error(call(), "was started again", class = "gym_error_connection")
     for (id in c(env$instance_id, ids)) expect_match(conditionMessage(cnd), id, fixed = TRUE)
   }
   # What is made on the new server is not lost.
