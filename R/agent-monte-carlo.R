@@ -12,9 +12,12 @@
 #' With `exploring_starts = TRUE` the first action of each episode is drawn uniformly from all
 #' actions (section 5.3). The environment draws the first state.
 #'
-#' A truncated episode counts as if it had ended there. Its return does not contain later rewards.
+#' An episode that a step limit cuts off counts as one that ends there: the rewards that it would
+#' still have earned count as 0.
 #'
 #' @inheritParams agent_q
+#' @param initial The first value of all actions, a number. The default is 0. A number above all
+#'   returns makes the agent try everything ("optimistic").
 #' @param ... As for [learn_q()]. The default of `episodes` is 1,000 if the server's processes play
 #'   them, and 10 otherwise.
 #' @param visits Which visits of a state and action count: `"first"`, the default, for the first one

@@ -42,10 +42,10 @@
 #'   of an action that was last taken k steps ago (Dyna-Q+; section 8.3). Planning then includes
 #'   actions that were never taken in a visited state, as if they led back to this state without a
 #'   reward. The default is 0, for none.
-#' @param mask The name of the element of the environment's info that marks the valid actions, such
-#'   as `"action_mask"` of Taxi: a number for each action (for each combination of its parts), 0 for
-#'   an invalid one. The agent never takes an action again at an observation where it was marked
-#'   invalid, and its value is `-Inf`. For tables only. `NULL`, the default, for none.
+#' @param mask The name of the element of the info that says at each step which actions are valid,
+#'   such as `"action_mask"` of Taxi. It has a number for each action (for each combination of its
+#'   parts), 0 for an invalid one. The agent never takes an action again at an observation where it
+#'   was marked invalid, and its value is `-Inf`. For tables only. `NULL`, the default, for none.
 #' @param env The environment, as for [train_agent()]. If it is an id with a row in
 #'   [agent_presets()], that row supplies the settings that you do not give. A message says so.
 #'   `learn_q()` also takes logged steps, as for [learn_fitted_q()]. It then sweeps over all pairs

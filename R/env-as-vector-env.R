@@ -282,8 +282,8 @@ if_supported <- function(code) {
 #'   that share a seed if all sub-environments have one generator (or `NULL`); `processes`, the
 #'   number of processes that play; `needs_max_steps`, whether an episode may go on forever;
 #'   `versions` and `processor`. `NULL` if R plays the episodes: for an environment in R or an
-#'   object, with frames, with wrappers that remember earlier episodes, or with arguments about
-#'   sub-environments.
+#'   object, with frames, with wrappers that are R functions or remember earlier episodes, with
+#'   arguments about sub-environments, or with a `num_envs` that the group does not have.
 #' @noRd
 describe_env <- function(env_id, arguments, client, num_envs = NULL, frames = FALSE,
                          call = rlang::caller_env()) {

@@ -52,6 +52,9 @@ env_action_space_sample <- function(x, instance_id) {
 
 #' Check whether a value belongs to a space
 #'
+#' The action space of an environment is the set of its actions, and the observation space that of
+#' its observations. In CartPole the actions are 0 and 1, so 2 does not belong to its action space.
+#'
 #' @inheritParams env_reset
 #' @param action,observation The value to check: any R object.
 #' @return `TRUE` or `FALSE`.

@@ -3,9 +3,9 @@
 #' Add a wrapper of Gymnasium to an environment before [gym_make()], [env_create()], [rollout()] or
 #' [search_random()] makes it, for example to limit the steps, scale the actions or shrink the
 #' pictures. Three wrappers call an R function, for example one that shapes rewards. Use the pipe to
-#' add several: the first is the innermost. The spaces in R are those of the wrapped environment. A
-#' `"TimeLimit"` can only lower the environment's own step limit;
-#' `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
+#' add several: the first is the innermost, so the others see what it returns. The spaces in R are
+#' those of the wrapped environment. A `"TimeLimit"` can only lower the environment's own step
+#' limit; `gym_make("MountainCar-v0", max_episode_steps = 1000)` raises it.
 #'
 #' # R functions
 #'
@@ -69,8 +69,10 @@
 #' env$reset()
 #' env$close()
 #'
-#' # Reward the car for its speed. fast <- "MountainCar-v0" |> gym_wrap("TransformReward", func =
-#' function(reward, next_observation) { reward + 10 * abs(next_observation[, "velocity"])
+#' # Reward the car for its speed.
+#' fast <- "MountainCar-v0" |>
+#'   gym_wrap("TransformReward", func = function(reward, next_observation) {
+#'     reward + 10 * abs(next_observation[, "velocity"])
 #'   })
 #' rollout(fast, policy_random(), episodes = 10, seed = 1)
 gym_wrap <- function(env_id, wrapper, ...) {

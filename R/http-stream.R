@@ -220,7 +220,8 @@ ask_stream <- function(stream, message, content, head, call) {
   # After an interrupt, the next data would be the answer to this message: drop the stream.
   on.exit(if (stream$busy) drop_stream(stream))
   answer <- exchange(stream$con, sent, message$count)
-  # The usual answer has arrays and nothing after them.
+  # The usual answer has arrays and nothing after them. Answers come in the order of the messages,
+  # so the number only tells an answer from other frames.
   is_usual <- !is.null(message$usual) && length(answer) == message$count &&
     answer[[1L]] == message$usual && answer[[2L]] == 0 && answer[[3L]] == number
   # NA is possible: another frame, such as a ping, may have bytes that are not numbers.

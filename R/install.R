@@ -2,7 +2,8 @@
 #'
 #' Make a Python environment for the server that comes with this package. You do not need to know
 #' Python. The environment has exact package versions that were tested together, and each file is
-#' checked by its hash. Nothing is compiled, and no other Python on the machine is changed.
+#' compared with a known hash (a fingerprint of its content). Nothing is compiled, and no other
+#' Python on the machine is changed.
 #'
 #' The program [uv](https://docs.astral.sh/uv/) does the work. It is looked for in the environment
 #' variables `GYM_UV` and `RETICULATE_UV`, on the `PATH`, in `~/.local/bin` and in reticulate's

@@ -1,7 +1,7 @@
 # Episodes of many candidates. If the server plays whole episodes, R requests them in large pieces
 # (play-beside.R). Otherwise R plays them itself, batch after batch.
 #
-# The rule: batches take the episodes candidate by candidate. A batch has as many whole candidates
+# If R plays, batches take the episodes candidate by candidate. A batch has as many whole candidates
 # as fit; a candidate with more episodes than a batch has batches of its own. The size of a batch
 # (`batch_size`) depends on the environment: as many episodes as sub-environments if these wait for
 # each other, four times as many if each plays on independently. If a wrapper remembers earlier
@@ -9,7 +9,7 @@
 #
 # So the number of cores, the worker and the time never change the result.
 
-#' Make an empty history of batches
+#' Make a history: what is to be played, and the results of what has been played
 #'
 #' @param candidates,episodes The number of candidates, and the number of episodes of each.
 #' @param streams As made by [new_streams()].

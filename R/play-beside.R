@@ -5,7 +5,7 @@
 # R divides the episodes into pieces. Each piece is a request, or a task for a worker of the plan.
 # Answers may come in any order; R adds them in the order of the episodes.
 
-#' Choose how a policy plays
+#' Choose the vector environment that a policy plays in
 #'
 #' @param vector_env As passed on by [with_vector_env()].
 #' @param policy The policy, bound to the environment, or several candidates.

@@ -32,7 +32,7 @@ play_requests <- function(play) {
 }
 
 # The number of units of the first piece: half of the last size, because with another policy a unit
-# may take longer.
+# may take longer, but at least an episode for each process (or one group of episodes).
 first_size <- function(play) {
   least <- if (is.null(play$episodes$row)) play$vector_env$description$processes else 1L
   max(least, (play$vector_env$known$size %||% 0L) %/% 2L)

@@ -15,8 +15,9 @@
 #' with it. This is the way if you give the environment by its id (with arguments, and wrappers of
 #' [gym_wrap()]) and the policy is data: [policy_random()], [policy_network()], [policy_linear()],
 #' [policy_table()], [policy_candidates()] and lists of these. An episode, including the random
-#' numbers of its policy, then depends only on the environment, the policy, its seed and
-#' `max_steps`. The number of processes and the other episodes do not matter.
+#' numbers of its policy, then depends only on the environment, the policy, its seed and `max_steps`
+#' (in CartPole, whose sub-environments share one seed, also on `sub_env`). The number of processes
+#' and the other episodes do not matter.
 #'
 #' **Step by step**: R chooses the actions of each step. This is the way for everything else:
 #' * functions, models and other policies that only R can run,
@@ -62,7 +63,8 @@
 #'   if it is given by its id.
 #' @param num_envs The number of sub-environments, a whole number, if the environment is given by
 #'   its id. If the server plays whole episodes, this number changes nothing except the column
-#'   `sub_env`. `NULL`, the default, chooses, see [as_vector_env()].
+#'   `sub_env`. (In CartPole it also decides how the episodes are played, see above.) `NULL`, the
+#'   default, chooses, see [as_vector_env()].
 #' @param next_observation Keep the observation after each step, in columns whose names begin with
 #'   `next_`, such as `next_pole_angle`? `FALSE`, the default, or `TRUE`, which requires
 #'   `steps = TRUE`. At the end of an episode it is the last observation of that episode.

@@ -209,9 +209,9 @@ taxi_cells <- function(cells, passenger, destination, model, call) {
   cells$row <- state %/% 100L + 1L
   cells$column <- state %/% 20L %% 5L + 1L
   cells <- cells[shown, ]
-  # There is a wall where a move to the right stays in place.
+  # There is a wall where a move to the right mostly stays in place; in the rain it may go aside.
   right <- model$transitions[model$transitions$action == 2L, ]
-  walls <- right$state[right$state == right$next_state & right$probability == 1]
+  walls <- right$state[right$state == right$next_state & right$probability > 0.5]
   list(
     cells = cells, columns = 5L, rows = 5L,
     walls = cells[cells$column < 5L & cells$state %in% walls, c("row", "column")],

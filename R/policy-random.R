@@ -3,8 +3,9 @@
 #' Make a policy that ignores the observation and draws its action from the action space, like
 #' Gymnasium's own `sample()`: uniformly between the bounds, from an exponential distribution if one
 #' side is unbounded, and from a normal distribution if both are. In a model (see [gym_model()]) it
-#' draws among the actions that the state has. It uses R's generator, so [set.seed()] fixes its
-#' actions. `random_discrete_agent()` makes such a policy for `n` actions; the name is that of the
+#' draws among the actions that the state has. With [act()] it draws by R's generator, so
+#' [set.seed()] fixes its actions; in [rollout()] its actions follow from `seed`.
+#' `random_discrete_agent()` makes such a policy for `n` actions; the name is that of the
 #' classic package.
 #'
 #' @param action_space The space to draw from, such as `gym_make("CartPole-v1")$action_space`.

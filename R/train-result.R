@@ -255,9 +255,10 @@ search_parts <- function(settings, state, history) {
 #' estimate its mean return. `print()`, `predict()` and [plot()][plot.gym_search()] never use R's
 #' random number generator.
 #'
-#' The best of many rounds of a few episodes was also lucky, so its mean return in the search is an
-#' overestimate. That is why `summary()` plays the policy again. By Gym's own definition, an
-#' environment is solved by a mean return of at least its threshold over 100 consecutive episodes.
+#' A round plays few episodes, so the best of many rounds owes part of its mean return to luck, and
+#' this mean is an overestimate. That is why `summary()` plays the policy again. By Gym's own
+#' definition, an environment is solved by a mean return of at least its threshold over 100
+#' consecutive episodes.
 #'
 #' @param x,object A search, as returned by [search_random()].
 #' @param row.names,optional,... Not used.

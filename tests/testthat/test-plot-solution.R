@@ -31,6 +31,9 @@ test_that("Taxi has a grid for each passenger and destination, with its walls", 
   # Gymnasium's map: +---------+ |R: | : :G| |X: | : : | | : : : : | | | : | : | |Y| : |B: |
   walls <- with(data$walls, paste(row, column))
   expect_setequal(walls, c("1 2", "2 2", "4 1", "5 1", "4 3", "5 3"))
+  # In the rain the taxi may go to one side instead.
+  rainy <- solve_mdp(env_model("Taxi-v4", is_rainy = TRUE, client = test_client()))
+  expect_identical(solution_plot_data(rainy, NULL, NULL, 4, 0, 1)$walls, data$walls)
   expect_length(layers_of(drawn(autoplot(taxi)), "GeomLabel")[[1]]$label, 4)
   expect_error(plot(taxi, passenger = 5), class = "gym_error_argument")
 })
