@@ -3,6 +3,7 @@
 import json
 import socket
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
@@ -98,15 +99,19 @@ def test_if_all_are_known_the_one_leaves_that_was_silent_for_longest(crowded):
     assert all(is_well(connection) for connection in (known[0], *known[2:]))
 
 
+def send_without_reading(connection):
+    """Send requests until the server, whose answers nobody reads, has taken none for a while."""
+    connection.settimeout(2)
+    with suppress(TimeoutError):
+        while True:
+            connection.send(GET * 1000)
+
+
 def test_a_new_client_waits_while_all_are_at_work(crowded, monkeypatch):
     monkeypatch.setattr(server_module, "_MOMENT_SECONDS", 0.1)
     known = [crowded() for _ in range(MOST)]
-    for connection in known:
-        # It does not read its answers.
-        with suppress(TimeoutError):
-            connection.settimeout(0.5)
-            while True:
-                connection.sendall(GET * 1000)
+    with ThreadPoolExecutor(MOST) as pool:
+        list(pool.map(send_without_reading, known))
     new = crowded()
     new.sendall(GET)
     new.settimeout(0.5)
