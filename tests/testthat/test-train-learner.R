@@ -149,7 +149,8 @@ test_that("a checkpoint tells schedules and models apart", {
             epsilon = schedule_linear(from, 0.05, 10))
   }
   learn(walk_model(), 1)
-  expect_error(learn(walk_model(), 0.5), "`agent` is a different one", class = "gym_error_checkpoint")
+  expect_error(learn(walk_model(), 0.5), "`agent` is a different one",
+               class = "gym_error_checkpoint")
   other <- walk_table()
   other$reward <- 2 * other$reward
   expect_error(learn(gym_model(other, start = 1), 1), "`env` is a different one",
