@@ -7,7 +7,6 @@ pixels differ a little.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import gymnasium
@@ -17,8 +16,9 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 
 # Arguments of a game that ale-py's vector environment has, too.
-_KWARGS = {"frameskip", "full_action_space", "max_num_frames_per_episode"}
-_KWARGS |= {"repeat_action_probability"}
+KWARGS = frozenset(
+    {"frameskip", "full_action_space", "max_num_frames_per_episode", "repeat_action_probability"}
+)
 
 
 class AtariVecEnv(VecEnv):
@@ -27,23 +27,41 @@ class AtariVecEnv(VecEnv):
     The infos have ``episode``, the score and frames of a whole game, as Monitor's.
     """
 
-    def __init__(self, env_id: str, num_envs: int, kwargs: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        env_id: str,
+        num_envs: int,
+        kwargs: dict[str, Any],
+        *,
+        noop_max: int,
+        frame_skip: int,
+        screen_size: int,
+        frame_stack: int,
+    ) -> None:
         """Make the games.
 
         Args:
             env_id: the game, such as ``"ALE/Pong-v5"``.
             num_envs: how many of them.
-            kwargs: arguments of the game that ``takes()`` accepts.
+            kwargs: arguments of the game, of those in ``KWARGS``.
+            noop_max: the largest number of steps without an action at the start.
+            frame_skip: for how many frames an action is taken.
+            screen_size: width and height of a picture in pixels.
+            frame_stack: how many pictures are observed together.
         """
         of_game = gymnasium.spec(env_id).kwargs
-        own = {name: value for name, value in of_game.items() if name in _KWARGS} | kwargs
-        self.frame_skip = own["frameskip"] = int(kwargs.get("frameskip", 4))
+        own = {name: value for name, value in of_game.items() if name in KWARGS} | kwargs
+        self.frame_skip = own["frameskip"] = frame_skip
         # ``episodic_life`` would begin a new game with each life.
         self.games = AtariVectorEnv(
             of_game["game"],
             num_envs,
             **own,
             autoreset_mode=AutoresetMode.SAME_STEP,
+            img_height=screen_size,
+            img_width=screen_size,
+            stack_num=frame_stack,
+            noop_max=noop_max,
             life_loss_info=True,
             reward_clipping=False,
         )
@@ -103,8 +121,3 @@ class AtariVecEnv(VecEnv):
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
         """Refuse: the games are not objects of Python."""
         raise NotImplementedError(method_name)
-
-
-def takes(kwargs: Iterable[str]) -> bool:
-    """Return whether the vector environment has these arguments of a game."""
-    return _KWARGS.issuperset(kwargs)

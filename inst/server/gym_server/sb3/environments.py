@@ -77,8 +77,12 @@ def vector_env(job: dict[str, Any]) -> VecEnv:
         # Only games need ale-py.
         from gym_server.sb3 import atari
 
-        if not job["wrappers"] and atari.takes(job["env_kwargs"]):
-            return atari.AtariVecEnv(job["env_id"], job["num_envs"], job["env_kwargs"])
+        if not job["wrappers"] and atari.KWARGS.issuperset(job["env_kwargs"]):
+            kwargs = dict(job["env_kwargs"])
+            treatment = _preprocessing(kwargs)
+            return atari.AtariVecEnv(
+                job["env_id"], job["num_envs"], kwargs, **treatment, frame_stack=_STACK
+            )
     made: VecEnv = DummyVecEnv([lambda: single_env(job, trains=True)] * job["num_envs"])
     return made
 

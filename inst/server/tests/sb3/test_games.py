@@ -15,8 +15,11 @@ def played(env_id, steps, **kwargs):
     import numpy as np
 
     from gym_server.sb3.atari import AtariVecEnv
+    from gym_server.sb3.environments import vector_env
 
-    games = AtariVecEnv(env_id, 2, kwargs)
+    job = {"algorithm": "PPO", "env_id": env_id, "env_kwargs": kwargs, "wrappers": []}
+    games = vector_env({**job, "atari": True, "num_envs": 2})
+    assert isinstance(games, AtariVecEnv)
     games.seed(1)
     pictures = games.reset()
     draws = np.random.default_rng(2)
